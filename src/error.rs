@@ -1,0 +1,72 @@
+//! One error type for the whole program, and the exit code each error stands for.
+
+use std::path::{Path, PathBuf};
+
+/// What went wrong, in words a user can act on.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// A value somebody typed or a file from elsewhere is outside what is allowed.
+    #[error("{file}: {field} = {value}: {allowed}")]
+    Input {
+        /// File the value stands in.
+        file: String,
+        /// Path of the field inside the file, such as `camera[0].width`.
+        field: String,
+        /// The offending value as written.
+        value: String,
+        /// What would have been accepted.
+        allowed: String,
+    },
+    /// A file is not of the kind, version or plan it should be, or is damaged. Nothing was changed.
+    #[error("{path}: refused: {reason}")]
+    Refused {
+        /// The file.
+        path: PathBuf,
+        /// Why it is not used.
+        reason: String,
+    },
+    /// The operating system refused to read or write a file.
+    #[error("{path}: {source}")]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The work itself failed.
+    #[error("{0}")]
+    Failed(String),
+}
+
+/// The result of everything that can fail.
+pub type Result<T> = std::result::Result<T, Error>;
+
+impl Error {
+    /// An [`Error::Input`] from anything printable.
+    pub fn input(file: impl ToString, field: impl ToString, value: impl ToString, allowed: impl ToString) -> Self {
+        Error::Input {
+            file: file.to_string(),
+            field: field.to_string(),
+            value: value.to_string(),
+            allowed: allowed.to_string(),
+        }
+    }
+
+    /// An [`Error::Refused`] for the file at `path`.
+    pub fn refused(path: &Path, reason: impl ToString) -> Self {
+        Error::Refused { path: path.to_owned(), reason: reason.to_string() }
+    }
+
+    /// A closure that attaches `path` to an I/O error, for `map_err`.
+    pub fn io(path: &Path) -> impl FnOnce(std::io::Error) -> Self + '_ {
+        move |source| Error::Io { path: path.to_owned(), source }
+    }
+
+    /// Exit code of the process: 2 for bad input, 1 for everything that failed.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Error::Input { .. } | Error::Refused { .. } => 2,
+            Error::Io { .. } | Error::Failed(_) => 1,
+        }
+    }
+}

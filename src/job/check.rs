@@ -1,0 +1,188 @@
+//! Every check on what a user typed: each refusal names the field, the value and what is allowed.
+
+use super::{Camera, Gonio, Grid, Job, Roulette, Source};
+use crate::error::{Error, Result};
+use std::collections::HashSet;
+use std::fmt::Debug;
+
+/// Largest picture: 2^28 pixels.
+const MAX_BINS: u64 = 1 << 28;
+/// Largest coordinate \[m\]: beyond it positions in f32 say little.
+const MAX_METRES: f64 = 1e6;
+
+/// Refuses `job` where a value lies outside its range.
+pub(super) fn check(job: &Job, file: &str) -> Result<()> {
+    let c = Checker { file };
+    check_run(&c, job)?;
+    check_names(&c, job)?;
+    for (i, camera) in job.cameras.iter().enumerate() {
+        check_camera(&c, &format!("camera[{i}]"), camera, job.scene.is_some())?;
+    }
+    for (i, grid) in job.grids.iter().enumerate() {
+        check_grid(&c, &format!("grid[{i}]"), grid)?;
+    }
+    for (i, point) in job.points.iter().enumerate() {
+        c.position(&format!("point[{i}].position"), point.position)?;
+        c.direction(&format!("point[{i}].normal"), point.normal)?;
+    }
+    for (i, gonio) in job.gonios.iter().enumerate() {
+        check_gonio(&c, &format!("gonio[{i}]"), gonio)?;
+    }
+    check_surfaces(&c, job)
+}
+
+fn check_run(c: &Checker, job: &Job) -> Result<()> {
+    let run = &job.run;
+    c.that("run.seed", run.seed, run.seed < 1 << 63, "0 .. 9223372036854775807")?;
+    c.range("run.histories_per_batch", run.histories_per_batch, 1, 1 << 24)?;
+    c.range("run.batches", run.batches, 1, 1 << 32)?;
+    c.range("run.batches_per_shard", run.batches_per_shard, 1, 1 << 20)?;
+    c.that(
+        "run.confidence",
+        run.confidence,
+        run.confidence > 0.0 && run.confidence < 1.0,
+        "between 0 and 1, exclusive",
+    )?;
+    let seconds = run.checkpoint_seconds;
+    c.that("run.checkpoint_seconds", seconds, (0.1..=86400.0).contains(&seconds), "0.1 .. 86400")?;
+    if let Roulette::Below(below) = job.transport.roulette_below {
+        let allowed = "above 0 and at most 1, or \"analog\"";
+        c.that("transport.roulette_below", below, below > 0.0 && below <= 1.0, allowed)?;
+    }
+    Ok(())
+}
+
+fn check_names(c: &Checker, job: &Job) -> Result<()> {
+    let mut seen = HashSet::new();
+    let sets = job.sets();
+    c.that("receivers", sets.len(), !sets.is_empty(), "at least one [[camera]], [[grid]], [[point]] or [[gonio]]")?;
+    for set in &sets {
+        let name = set.name.as_str();
+        let plain = |b: u8| b.is_ascii_alphanumeric() || b == b'_' || b == b'-';
+        let fits = (1..=64).contains(&name.len()) && name.bytes().all(plain);
+        c.that("name", name, fits, "1 .. 64 letters, digits, '_' or '-'")?;
+        // Results are files named after their sets; `points.csv` and `summary.json` are already taken.
+        let free = !["points", "summary", "flux"].contains(&name);
+        c.that("name", name, free, "any name but points, summary and flux")?;
+        c.that("name", name, seen.insert(name.to_ascii_lowercase()), "a name used only once")?;
+    }
+    Ok(())
+}
+
+fn check_camera(c: &Checker, at: &str, camera: &Camera, has_scene: bool) -> Result<()> {
+    check_size(c, at, [("width", camera.width), ("height", camera.height)], camera.pixel_samples)?;
+    let typed = camera.eye.is_some() || camera.target.is_some() || camera.vertical_fov_degrees.is_some();
+    if let Some(node) = &camera.node {
+        let allowed = "a node, or eye, target and vertical_fov_degrees, not both";
+        c.that(&format!("{at}.node"), node, !typed && camera.up.is_none(), allowed)?;
+        return c.that(&format!("{at}.node"), node, has_scene, "a node only with a scene");
+    }
+    let Some(view) = camera.view() else {
+        let allowed = "either node, or all of eye, target and vertical_fov_degrees";
+        return Err(Error::input(c.file, at, "(incomplete)", allowed));
+    };
+    c.position(&format!("{at}.eye"), view.eye)?;
+    c.position(&format!("{at}.target"), view.target)?;
+    c.direction(&format!("{at}.up"), view.up)?;
+    let forward: [f64; 3] = std::array::from_fn(|i| view.target[i] - view.eye[i]);
+    c.direction(&format!("{at}.target minus eye"), forward)?;
+    let across = cross(forward, view.up);
+    let scale = length(forward) * length(view.up);
+    c.that(&format!("{at}.up"), Shown(view.up), length(across) > 1e-6 * scale, "not parallel to the line of sight")?;
+    let fov = view.vertical_fov_degrees;
+    c.that(&format!("{at}.vertical_fov_degrees"), fov, fov > 0.0 && fov < 180.0, "between 0 and 180, exclusive")
+}
+
+fn check_gonio(c: &Checker, at: &str, gonio: &Gonio) -> Result<()> {
+    check_size(c, at, [("width", gonio.width), ("height", gonio.height)], gonio.pixel_samples)?;
+    c.position(&format!("{at}.position"), gonio.position)?;
+    match (gonio.surface, gonio.normal) {
+        (true, Some(normal)) => c.direction(&format!("{at}.normal"), normal),
+        (true, None) => Err(Error::input(c.file, format!("{at}.normal"), "(missing)", "needed with surface = true")),
+        (false, Some(n)) => Err(Error::input(c.file, format!("{at}.normal"), Shown(n), "only with surface = true")),
+        (false, None) => Ok(()),
+    }
+}
+
+fn check_grid(c: &Checker, at: &str, grid: &Grid) -> Result<()> {
+    check_size(c, at, [("columns", grid.columns), ("rows", grid.rows)], 1)?;
+    c.position(&format!("{at}.origin"), grid.origin)?;
+    c.position(&format!("{at}.u"), grid.u)?;
+    c.position(&format!("{at}.v"), grid.v)?;
+    c.direction(&format!("{at}.normal"), grid.normal)
+}
+
+fn check_size(c: &Checker, at: &str, size: [(&str, u32); 2], samples: u32) -> Result<()> {
+    for (name, n) in size {
+        c.range(&format!("{at}.{name}"), u64::from(n), 1, 65536)?;
+    }
+    let bins = u64::from(size[0].1) * u64::from(size[1].1);
+    c.that(&format!("{at}.{} x {}", size[0].0, size[1].0), bins, bins <= MAX_BINS, "at most 268435456 in all")?;
+    c.that(&format!("{at}.pixel_samples"), samples, [1, 4, 9, 16].contains(&samples), "1, 4, 9 or 16")
+}
+
+fn check_surfaces(c: &Checker, job: &Job) -> Result<()> {
+    for (i, plane) in job.planes.iter().enumerate() {
+        c.position(&format!("plane[{i}].point"), plane.point)?;
+        c.direction(&format!("plane[{i}].normal"), plane.normal)?;
+        c.share(&format!("plane[{i}].reflectance"), plane.reflectance)?;
+    }
+    for (i, sphere) in job.spheres.iter().enumerate() {
+        c.position(&format!("sphere[{i}].center"), sphere.center)?;
+        c.share(&format!("sphere[{i}].reflectance"), sphere.reflectance)?;
+        let radius = sphere.radius;
+        c.that(&format!("sphere[{i}].radius"), radius, radius > 0.0 && radius <= MAX_METRES, "above 0, at most 1e6")?;
+    }
+    for (i, Source::Omni { position, intensity }) in job.sources.iter().enumerate() {
+        c.position(&format!("source[{i}].position"), *position)?;
+        let fits = *intensity > 0.0 && *intensity <= 1e12;
+        c.that(&format!("source[{i}].intensity"), intensity, fits, "above 0, at most 1e12 cd")?;
+    }
+    let lit = job.scene.is_some() || !job.sources.is_empty();
+    c.that("scene", "(missing)", lit, "a scene file, or planes, spheres and at least one [[source]]")
+}
+
+struct Checker<'a> {
+    file: &'a str,
+}
+
+impl Checker<'_> {
+    fn that(&self, field: &str, value: impl ToString, holds: bool, allowed: &str) -> Result<()> {
+        if holds { Ok(()) } else { Err(Error::input(self.file, field, value, allowed)) }
+    }
+
+    fn range(&self, field: &str, value: u64, low: u64, high: u64) -> Result<()> {
+        self.that(field, value, (low..=high).contains(&value), &format!("{low} .. {high}"))
+    }
+
+    fn share(&self, field: &str, value: f64) -> Result<()> {
+        self.that(field, value, (0.0..=1.0).contains(&value), "0 .. 1")
+    }
+
+    fn position(&self, field: &str, p: [f64; 3]) -> Result<()> {
+        let fits = p.iter().all(|x| x.abs() <= MAX_METRES);
+        self.that(field, Shown(p), fits, "three finite numbers of at most 1e6 m")
+    }
+
+    fn direction(&self, field: &str, n: [f64; 3]) -> Result<()> {
+        let fits = n.iter().all(|x| x.abs() <= MAX_METRES) && length(n) >= 1e-9;
+        self.that(field, Shown(n), fits, "three finite numbers, not all zero")
+    }
+}
+
+/// Shows a vector as it is typed.
+struct Shown<T>(T);
+
+impl<T: Debug> std::fmt::Display for Shown<T> {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        write!(f, "{:?}", self.0)
+    }
+}
+
+fn length(v: [f64; 3]) -> f64 {
+    (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt()
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}

@@ -1,0 +1,218 @@
+//! The job file: what is asked. TOML -> [`Job`], every default filled in, every value a user typed checked.
+//!
+//! Lengths are metres in the axes of glTF (+Y up), angles degrees where the name says so. Paths are relative to
+//! the job file. Unknown keys are refused. A [`Job`] is plain data: reading it opens one file and nothing else.
+
+mod check;
+mod receivers;
+
+pub use receivers::{Camera, Gonio, Grid, Kept, Point, ReceiverKind, SetShape, View};
+
+use crate::error::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// One simulation as its user describes it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Job {
+    /// The glTF scene, relative to the job file; optional when planes, spheres and sources are given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scene: Option<String>,
+    /// How much is computed, with which seed.
+    #[serde(default)]
+    pub run: Run,
+    /// How trajectories end.
+    #[serde(default)]
+    pub transport: Transport,
+    /// Luminance maps.
+    #[serde(default, rename = "camera", skip_serializing_if = "Vec::is_empty")]
+    pub cameras: Vec<Camera>,
+    /// Illuminance grids.
+    #[serde(default, rename = "grid", skip_serializing_if = "Vec::is_empty")]
+    pub grids: Vec<Grid>,
+    /// Single lux-meters.
+    #[serde(default, rename = "point", skip_serializing_if = "Vec::is_empty")]
+    pub points: Vec<Point>,
+    /// Spatial-angular luminance distributions.
+    #[serde(default, rename = "gonio", skip_serializing_if = "Vec::is_empty")]
+    pub gonios: Vec<Gonio>,
+    /// Infinite one-sided Lambert planes.
+    #[serde(default, rename = "plane", skip_serializing_if = "Vec::is_empty")]
+    pub planes: Vec<Plane>,
+    /// Analytic Lambert spheres.
+    #[serde(default, rename = "sphere", skip_serializing_if = "Vec::is_empty")]
+    pub spheres: Vec<Sphere>,
+    /// Light sources beside those of the scene file.
+    #[serde(default, rename = "source", skip_serializing_if = "Vec::is_empty")]
+    pub sources: Vec<Source>,
+}
+
+/// `[run]`: seed, division of work and confidence.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Run {
+    /// Seed of every random number, 0 ..= 2^63-1.
+    pub seed: u64,
+    /// Histories of one batch; a batch is one realization, the unit of the variance.
+    pub histories_per_batch: u64,
+    /// Number of batches of the whole job.
+    pub batches: u64,
+    /// Shard k holds the batches [k n, k n + n).
+    pub batches_per_shard: u64,
+    /// Confidence of the intervals, between 0 and 1.
+    pub confidence: f64,
+    /// One photometric channel, or linear Rec.709.
+    pub channels: Channels,
+    /// Longest time between two checkpoints \[s\].
+    pub checkpoint_seconds: f64,
+}
+
+impl Default for Run {
+    fn default() -> Self {
+        Run {
+            seed: 1,
+            histories_per_batch: 64,
+            batches: 256,
+            batches_per_shard: 32,
+            confidence: 0.95,
+            channels: Channels::Luminance,
+            checkpoint_seconds: 30.0,
+        }
+    }
+}
+
+/// What a weight is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Channels {
+    /// One photometric channel: exact for grey reflectances only.
+    Luminance,
+    /// Linear Rec.709 red, green, blue, each its own weight on the same trajectory.
+    Rgb,
+}
+
+/// `[transport]`: how trajectories end. There is no depth cut.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Transport {
+    /// Survival probability min(1, W_n / (roulette_below W_1)), or "analog": the reflectance itself.
+    pub roulette_below: Roulette,
+}
+
+impl Default for Transport {
+    fn default() -> Self {
+        Transport { roulette_below: Roulette::Below(0.05) }
+    }
+}
+
+/// Unbiased Russian roulette.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Roulette {
+    /// Weights below this share of the first weight are played for.
+    Below(f64),
+    /// Analog absorption: survival probability = reflectance from the first vertex on.
+    Analog(Analog),
+}
+
+/// The word "analog".
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Analog {
+    /// The only word allowed.
+    Analog,
+}
+
+/// `[[plane]]`: infinite Lambert plane, reflecting on the side of its normal, absorbing on the other.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Plane {
+    /// A point of the plane \[m\].
+    pub point: [f64; 3],
+    /// Normal on the reflecting side; need not be a unit vector.
+    pub normal: [f64; 3],
+    /// Lambert reflectance, 0 ..= 1.
+    pub reflectance: f64,
+}
+
+/// `[[sphere]]`: analytic Lambert sphere, reflecting on one side, absorbing on the other.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sphere {
+    /// Centre \[m\].
+    pub center: [f64; 3],
+    /// Radius \[m\].
+    pub radius: f64,
+    /// Reflecting side.
+    #[serde(default)]
+    pub facing: Facing,
+    /// Lambert reflectance, 0 ..= 1.
+    pub reflectance: f64,
+}
+
+/// Reflecting side of a sphere.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Facing {
+    /// The inside reflects: an integrating sphere.
+    Inward,
+    /// The outside reflects.
+    #[default]
+    Outward,
+}
+
+/// `[[source]]`: a light source given in the job.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, tag = "kind", rename_all = "lowercase")]
+pub enum Source {
+    /// The same intensity in all directions.
+    Omni {
+        /// Position \[m\].
+        position: [f64; 3],
+        /// Luminous intensity \[cd\].
+        intensity: f64,
+    },
+}
+
+impl Job {
+    /// Reads and checks the job file at `path`.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming the field, its value and the allowed range; [`Error::Io`].
+    pub fn read(path: &Path) -> Result<Job> {
+        let text = std::fs::read_to_string(path).map_err(Error::io(path))?;
+        Job::parse(&text, &path.display().to_string())
+    }
+
+    /// Checks the text of a job file; `file` is its name in errors.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming the field, its value and the allowed range.
+    pub fn parse(text: &str, file: &str) -> Result<Job> {
+        let toml = toml::Deserializer::parse(text).map_err(|e| syntax_error(file, text, "(syntax)", &e))?;
+        let job: Job = serde_path_to_error::deserialize(toml).map_err(|e| {
+            let field = e.path().to_string();
+            syntax_error(file, text, &field, e.inner())
+        })?;
+        check::check(&job, file)?;
+        Ok(job)
+    }
+
+    /// All receiver sets in the order of the tallies: cameras, gonios, grids, points.
+    pub fn sets(&self) -> Vec<SetShape> {
+        let cameras = self.cameras.iter().map(|c| c.shape(self.run.channels));
+        let gonios = self.gonios.iter().map(|g| g.shape(self.run.channels));
+        let grids = self.grids.iter().map(|g| g.shape());
+        let points = self.points.iter().map(|p| p.shape());
+        cameras.chain(gonios).chain(grids).chain(points).collect()
+    }
+}
+
+/// A TOML or type error as an input error: the value is the text of the line where it was found.
+fn syntax_error(file: &str, text: &str, field: &str, error: &toml::de::Error) -> Error {
+    let offset = error.span().map_or(0, |s| s.start);
+    let line = text[..offset.min(text.len())].matches('\n').count();
+    let value = text.lines().nth(line).unwrap_or("").trim();
+    Error::input(file, format!("{field} (line {})", line + 1), value, error.message())
+}

@@ -1,0 +1,206 @@
+//! Receiver sets of a job: what they are called, how many bins they have, where a bin lies.
+
+use super::Channels;
+use serde::{Deserialize, Serialize};
+
+/// `[[camera]]`: luminance map by double local estimation.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Camera {
+    /// Name of the map and of its files.
+    pub name: String,
+    /// A camera node of the scene; or `eye`, `target`, `up`, `vertical_fov_degrees`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub node: Option<String>,
+    /// Position of the eye \[m\].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub eye: Option<[f64; 3]>,
+    /// Point in the centre of the picture \[m\].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub target: Option<[f64; 3]>,
+    /// Direction that points up in the picture; +Y when left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub up: Option<[f64; 3]>,
+    /// Vertical field of view \[degrees\].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub vertical_fov_degrees: Option<f64>,
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Positions in a pixel and batch: 1, 4, 9 or 16, one in each stratum.
+    #[serde(default = "four")]
+    pub pixel_samples: u32,
+}
+
+/// Where a camera without a node stands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// Position of the eye \[m\].
+    pub eye: [f64; 3],
+    /// Point in the centre of the picture \[m\].
+    pub target: [f64; 3],
+    /// Direction that points up in the picture.
+    pub up: [f64; 3],
+    /// Vertical field of view \[degrees\].
+    pub vertical_fov_degrees: f64,
+}
+
+/// `[[grid]]`: illuminance by local estimation at cell centres, row-major, u fastest.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Grid {
+    /// Name of the grid and of its files.
+    pub name: String,
+    /// Corner of cell (0, 0) \[m\].
+    pub origin: [f64; 3],
+    /// Edge along a row \[m\].
+    pub u: [f64; 3],
+    /// Edge along a column \[m\].
+    pub v: [f64; 3],
+    /// Direction that the lux-meters face; normalised here, need not be u x v.
+    pub normal: [f64; 3],
+    /// Cells along u.
+    pub columns: u32,
+    /// Cells along v.
+    pub rows: u32,
+    /// Keep every batch's score (variance of the variance, jackknife) or moments only.
+    #[serde(default = "yes")]
+    pub keep_batches: bool,
+}
+
+/// `[[point]]`: one lux-meter.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Point {
+    /// Name of the lux-meter.
+    pub name: String,
+    /// Position \[m\].
+    pub position: [f64; 3],
+    /// Direction that it faces.
+    pub normal: [f64; 3],
+}
+
+/// `[[gonio]]`: luminance at one point in many directions.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Gonio {
+    /// Name of the map and of its files.
+    pub name: String,
+    /// The point \[m\].
+    pub position: [f64; 3],
+    /// False: luminance seen from the free point. True: luminance leaving the surface point found there.
+    #[serde(default)]
+    pub surface: bool,
+    /// Normal of the surface point; only with `surface = true`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub normal: Option<[f64; 3]>,
+    /// Directions along the equator.
+    pub width: u32,
+    /// Directions from pole to pole.
+    pub height: u32,
+    /// Directions in a texel and batch: 1, 4, 9 or 16, one in each stratum.
+    #[serde(default = "four")]
+    pub pixel_samples: u32,
+}
+
+/// What is remembered of the scores of a set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Kept {
+    /// Number, mean and sum of squares of batch scores, and with `colour` the mean of R, G and B.
+    Moments {
+        /// True when R, G, B differ.
+        colour: bool,
+    },
+    /// Every batch's score.
+    EveryBatch,
+}
+
+/// What a receiver set measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum ReceiverKind {
+    /// Luminance map of a camera \[cd/m2\].
+    Camera,
+    /// Luminance over directions \[cd/m2\].
+    Gonio,
+    /// Illuminance grid \[lx\].
+    Grid,
+    /// One lux-meter \[lx\].
+    Point,
+}
+
+/// Name, size and keeping of one receiver set: all that plans, tallies and checkpoints know of it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SetShape {
+    /// Unique name.
+    pub name: String,
+    /// What it measures.
+    pub kind: ReceiverKind,
+    /// Bins in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// What is remembered of its scores.
+    pub kept: Kept,
+}
+
+impl SetShape {
+    /// Number of bins.
+    pub fn bins(&self) -> usize {
+        self.width as usize * self.height as usize
+    }
+}
+
+impl Camera {
+    /// The view typed into the job, when the camera has no node. Checked when the job was read.
+    pub fn view(&self) -> Option<View> {
+        Some(View {
+            eye: self.eye?,
+            target: self.target?,
+            up: self.up.unwrap_or([0.0, 1.0, 0.0]),
+            vertical_fov_degrees: self.vertical_fov_degrees?,
+        })
+    }
+
+    pub(super) fn shape(&self, channels: Channels) -> SetShape {
+        let kept = Kept::Moments { colour: channels == Channels::Rgb };
+        SetShape { name: self.name.clone(), kind: ReceiverKind::Camera, width: self.width, height: self.height, kept }
+    }
+}
+
+impl Gonio {
+    pub(super) fn shape(&self, channels: Channels) -> SetShape {
+        let kept = Kept::Moments { colour: channels == Channels::Rgb };
+        SetShape { name: self.name.clone(), kind: ReceiverKind::Gonio, width: self.width, height: self.height, kept }
+    }
+}
+
+impl Grid {
+    /// Centre of the cell number `index` \[m\].
+    pub fn position(&self, index: usize) -> [f64; 3] {
+        let (column, row) = (index % self.columns as usize, index / self.columns as usize);
+        let a = (column as f64 + 0.5) / f64::from(self.columns);
+        let b = (row as f64 + 0.5) / f64::from(self.rows);
+        std::array::from_fn(|i| self.origin[i] + a * self.u[i] + b * self.v[i])
+    }
+
+    pub(super) fn shape(&self) -> SetShape {
+        let kept = if self.keep_batches { Kept::EveryBatch } else { Kept::Moments { colour: false } };
+        SetShape { name: self.name.clone(), kind: ReceiverKind::Grid, width: self.columns, height: self.rows, kept }
+    }
+}
+
+impl Point {
+    pub(super) fn shape(&self) -> SetShape {
+        let kept = Kept::EveryBatch;
+        SetShape { name: self.name.clone(), kind: ReceiverKind::Point, width: 1, height: 1, kept }
+    }
+}
+
+fn four() -> u32 {
+    4
+}
+
+fn yes() -> bool {
+    true
+}

@@ -1,0 +1,10 @@
+//! Lampyris
+
+pub mod error;
+pub mod farm;
+pub mod job;
+pub mod math;
+pub mod photometry;
+pub mod random;
+pub mod scene;
+pub mod tally;

@@ -1,0 +1,3 @@
+//! Parse, dispatch, print the error, set the exit code.
+
+fn main() {}

@@ -1,0 +1,93 @@
+//! From batch scores to estimates, intervals and figures of merit (docs/method.md, "Statistics").
+
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+/// The number with its error: mean of batch scores and standard error of that mean.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimate {
+    /// Number of batches.
+    pub n: u64,
+    /// Mean of the batch scores; NaN for n = 0.
+    pub mean: f64,
+    /// Standard error of the mean, sqrt(M2 / (n (n-1))); NaN below n = 2 and where nothing ever scored.
+    pub standard_error: f64,
+}
+
+impl Estimate {
+    /// From `n`, the mean and the central sum of squares M2.
+    pub fn from_moments(n: u64, mean: f64, m2: f64) -> Self {
+        let (mean, standard_error) = match n {
+            0 => (f64::NAN, f64::NAN),
+            1 => (mean, f64::NAN),
+            _ => (mean, (m2 / (n as f64 * (n - 1) as f64)).sqrt()),
+        };
+        Estimate { n, mean, standard_error }
+    }
+
+    /// From every batch's score, in batch order.
+    pub fn from_scores(scores: impl Iterator<Item = f64>) -> Self {
+        let (mut n, mut mean, mut m2) = (0u64, 0.0, 0.0);
+        for score in scores {
+            n += 1;
+            let d = score - mean;
+            mean += d / n as f64;
+            m2 += d * (score - mean);
+        }
+        Estimate::from_moments(n, mean, m2)
+    }
+
+    /// The same estimate with the constant `offset` added: a part known without error.
+    pub fn shifted(self, offset: f64) -> Self {
+        Estimate { mean: self.mean + offset, ..self }
+    }
+
+    /// Standard error over the size of the mean.
+    pub fn relative_error(self) -> f64 {
+        self.standard_error / self.mean.abs()
+    }
+
+    /// The interval `mean -+ quantile x standard error`, not clamped at 0.
+    pub fn interval(self, quantile: f64) -> (f64, f64) {
+        let half = quantile * self.standard_error;
+        (self.mean - half, self.mean + half)
+    }
+}
+
+/// Two-sided Student quantile t for `n` batches: |T| <= t with probability `confidence`, n - 1 degrees of freedom.
+/// NaN below n = 2.
+///
+/// Rounded to ten significant digits: `statrs` takes its logarithms from the C library, whose last bits differ
+/// between machines, and intervals must not.
+pub fn student_quantile(confidence: f64, n: u64) -> f64 {
+    if n < 2 {
+        return f64::NAN;
+    }
+    let student = StudentsT::new(0.0, 1.0, (n - 1) as f64).expect("scale and freedom are positive");
+    let quantile = student.inverse_cdf(0.5 + 0.5 * confidence);
+    format!("{quantile:.9e}").parse().expect("a printed number reads back")
+}
+
+/// Variance of the variance of batch scores, M4/M2^2 - 1/n, equation (11.2); NaN where M2 = 0.
+pub fn variance_of_variance(scores: impl Iterator<Item = f64> + Clone) -> f64 {
+    let Estimate { n, mean, .. } = Estimate::from_scores(scores.clone());
+    let (m2, m4) = scores.fold((0.0, 0.0), |(m2, m4), x| {
+        let d2 = (x - mean) * (x - mean);
+        (m2 + d2, m4 + d2 * d2)
+    });
+    if m2 == 0.0 { f64::NAN } else { m4 / (m2 * m2) - 1.0 / n as f64 }
+}
+
+/// Figure of merit 1/(R^2 T) \[1/s\] of a relative error R reached in T seconds.
+pub fn figure_of_merit(relative_error: f64, seconds: f64) -> f64 {
+    1.0 / (relative_error * relative_error * seconds)
+}
+
+/// Median of the finite values; NaN without any.
+pub fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut finite: Vec<f64> = values.filter(|x| x.is_finite()).collect();
+    if finite.is_empty() {
+        return f64::NAN;
+    }
+    let middle = finite.len() / 2;
+    *finite.select_nth_unstable_by(middle, f64::total_cmp).1
+}
