@@ -79,9 +79,10 @@ impl Generator {
         DVec2::new(x, self.uniform())
     }
 
-    /// Uniform integer in `0..n`, for n far below 2^53.
-    pub fn below(&mut self, n: usize) -> usize {
-        ((self.uniform() * n as f64) as usize).min(n - 1)
+    /// Uniform integer in `0..n`.
+    pub fn below(&mut self, n: u32) -> u32 {
+        // The product is below n: uniform() is at most 1 - 2^-53 and n is exact in f64.
+        (self.uniform() * f64::from(n)) as u32
     }
 }
 

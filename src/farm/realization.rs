@@ -1,38 +1,105 @@
 //! One realization of a job: the scores of one batch, the only parallel computation.
 //!
 //! A batch is computed from its index alone. Its histories are traced in parallel and collected in index order;
-//! then every receiver sums all vertices in index order, so any number of threads gives the same bits.
+//! then every tile of receivers sums all vertices in index order, so any number of threads gives the same bits.
+//! Each receiver set keeps the order in which its bins share tiles, found once from the centres of its bins.
 
-use super::plan::Plan;
+use super::receivers::{ReceiverSet, TileScores};
 use crate::error::Result;
+use crate::job::{Channels, Job};
+use crate::random::{Domain, Stream};
 use crate::scene::Scene;
-use crate::tally::BatchScores;
+use crate::tally::{BatchScores, Scores};
+use crate::transport::connection::{Connectors, TILE};
+use crate::transport::trajectory::{FluxBalance, Vertex, trace};
+use rayon::prelude::*;
+use std::ops::Range;
 
-/// Everything that is the same for every batch of a plan.
+/// Histories traced by one thread at a time.
+const HISTORIES_AT_ONCE: u64 = 64;
+
+/// Everything that is the same for every batch of a job.
 pub struct Realization<'a> {
-    plan: &'a Plan,
+    job: &'a Job,
     scene: &'a Scene,
+    sets: Vec<ReceiverSet>,
+    fixed_direct: Vec<Vec<f64>>,
+    trajectories: Stream,
+    orders: Range<u32>,
 }
 
 impl<'a> Realization<'a> {
-    /// Prepares the receivers of `plan` in `scene`, in the current rayon pool.
+    /// Prepares the receivers of `job` in `scene`, in the current rayon pool.
     ///
     /// # Errors
     /// A receiver that cannot be placed, such as a camera node that the scene has not.
-    pub fn new(plan: &'a Plan, scene: &'a Scene) -> Result<Self> {
-        Ok(Realization { plan, scene })
+    pub fn new(job: &'a Job, scene: &'a Scene) -> Result<Self> {
+        let sets = ReceiverSet::all(job, scene)?;
+        let fixed_direct = sets.iter().map(|s| s.fixed_direct(scene)).collect();
+        let trajectories = Stream::new(job.run.seed, Domain::Trajectory, "");
+        Ok(Realization { job, scene, sets, fixed_direct, trajectories, orders: 1..u32::MAX })
+    }
+
+    /// The same realization with only the vertices x_n, n in `orders`, connected: for tests order by order.
+    pub fn with_orders(self, orders: Range<u32>) -> Self {
+        Realization { orders, ..self }
     }
 
     /// Direct light that is the same in every batch, for each receiver set one entry a bin (NaN: no receiver
     /// there), or empty for zero everywhere \[lx or cd/m2\].
     pub fn fixed_direct(&self) -> &[Vec<f64>] {
-        let _ = self.scene;
-        &[]
+        &self.fixed_direct
     }
 
     /// The scores of the batch number `index`.
     pub fn batch(&self, index: u64) -> BatchScores {
-        let _ = (index, self.plan);
-        BatchScores { sets: Vec::new(), flux: [0.0; 5] }
+        let (histories, flux) = self.trace(index);
+        let scores = self.sets.par_iter().map(|set| self.score(set, index, &histories)).collect();
+        let per_history = 1.0 / self.job.run.histories_per_batch as f64;
+        let flux = [flux.emitted, flux.absorbed, flux.escaped, flux.lost, flux.met_delta].map(|x| x * per_history);
+        BatchScores { sets: scores, flux }
+    }
+
+    /// Traces the histories of a batch and prepares their vertices.
+    fn trace(&self, index: u64) -> (Connectors, FluxBalance) {
+        let count = self.job.run.histories_per_batch;
+        let first = index * count;
+        let starts: Vec<u64> = (0..count).step_by(HISTORIES_AT_ONCE as usize).collect();
+        let traced: Vec<_> = starts
+            .into_par_iter()
+            .map(|start| self.trace_some(first + start..first + (start + HISTORIES_AT_ONCE).min(count)))
+            .collect();
+        let mut connectors = Connectors::default();
+        let mut flux = FluxBalance::default();
+        for (vertices, balance) in traced.iter().flatten() {
+            connectors.push(self.scene, vertices, &self.orders);
+            flux.add(balance);
+        }
+        (connectors, flux)
+    }
+
+    fn trace_some(&self, histories: Range<u64>) -> Vec<(Vec<Vertex>, FluxBalance)> {
+        let trace = |history| {
+            let mut vertices = Vec::new();
+            let mut rng = self.trajectories.generator(history);
+            let flux = trace(self.scene, &self.job.transport, &mut rng, &mut vertices);
+            (vertices, flux)
+        };
+        histories.map(trace).collect()
+    }
+
+    /// The scores of one receiver set.
+    fn score(&self, set: &ReceiverSet, batch: u64, histories: &Connectors) -> Scores {
+        let channels = if self.job.run.channels == Channels::Rgb { 3 } else { 1 };
+        let tiles: Vec<TileScores> = set
+            .order()
+            .par_chunks(TILE)
+            .map(|bins| set.score_tile(self.scene, bins, batch, histories, channels))
+            .collect();
+        let mut scores = Scores::zero(set.shape());
+        for (bins, tile) in set.order().chunks(TILE).zip(tiles) {
+            tile.scatter(bins, &mut scores);
+        }
+        scores
     }
 }

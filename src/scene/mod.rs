@@ -9,8 +9,11 @@ mod reflectance;
 mod source;
 
 pub use reflectance::{Reflectance, Scattered};
-pub use source::{Light, Sources};
+pub use source::{Emission, Emitter, Light, Sources};
 
+use crate::error::{Error, Result};
+use crate::geometry::{Geometry, Hit, Mesh, Plane, Sphere};
+use crate::job::{self, Channels, Job};
 use crate::math::DVec3;
 use crate::photometry::Colour;
 
@@ -63,16 +66,152 @@ pub struct Model {
     pub warnings: Vec<String>,
 }
 
-/// A model ready for transport.
-pub struct Scene {}
+/// A model ready for transport, in re-centred coordinates.
+pub struct Scene {
+    /// Where surfaces are.
+    pub geometry: Geometry,
+    /// All light sources.
+    pub sources: Sources,
+    /// Cameras of the scene file.
+    pub cameras: Vec<CameraNode>,
+    /// What was ignored or replaced, each with its effect.
+    pub warnings: Vec<String>,
+    /// Added to a position of the job or of the file it gives the position in the scene \[m\].
+    offset: DVec3,
+    surfaces: Vec<Surface>,
+    surface_of: Vec<u32>,
+}
 
 impl Scene {
     /// Joins `model` (the scene file) with the planes, spheres and sources of `job`.
     ///
     /// # Errors
-    /// [`crate::error::Error::Input`] for a scene without light, or parallel light over infinite planes.
-    pub fn new(model: Model, job: &crate::job::Job) -> crate::error::Result<Scene> {
-        let _ = (model, job);
-        Ok(Scene {})
+    /// [`Error::Input`] for a scene without light, or parallel light over infinite planes.
+    pub fn new(model: Model, job: &Job) -> Result<Scene> {
+        let offset = -middle(&model.positions);
+        let paint = |c: Colour| match job.run.channels {
+            Channels::Luminance => Colour::grey(c.luminance()),
+            Channels::Rgb => c,
+        };
+        let corners = model.triangles.iter().map(|t| t.map(|v| (model.positions[v as usize] + offset).as_vec3()));
+        let mesh = Mesh::new(&corners.collect::<Vec<_>>());
+        let mut surfaces: Vec<Surface> = model.surfaces.into_iter().map(|s| painted(s, job.run.channels)).collect();
+        let mut surface_of = model.surface_of;
+        let geometry = Geometry::new(mesh, spheres(job, offset), planes(job, offset));
+        let shares = job.spheres.iter().map(|s| s.reflectance).chain(job.planes.iter().map(|p| p.reflectance));
+        for share in shares {
+            surface_of.push(surfaces.len() as u32);
+            surfaces.push(analytic_surface(share));
+        }
+        let emitters = emitters(&geometry, &surfaces, &surface_of);
+        let lights = model.lights.into_iter().chain(job.sources.iter().map(light));
+        let lights: Vec<Light> = lights.map(|l| l.moved(offset).recoloured(paint)).collect();
+        refuse_endless_flux(&geometry, &lights)?;
+        let sources = Sources::new(lights, emitters, geometry.bounding_sphere());
+        if sources.is_empty() {
+            return Err(Error::input("scene", "sources", "none", "at least one light or emissive surface"));
+        }
+        let cameras = model.cameras.into_iter().map(|c| CameraNode { eye: c.eye + offset, ..c }).collect();
+        Ok(Scene { geometry, sources, cameras, warnings: model.warnings, offset, surfaces, surface_of })
     }
+
+    /// A position of the job in the coordinates of the scene \[m\].
+    pub fn place(&self, position: [f64; 3]) -> DVec3 {
+        DVec3::from(position) + self.offset
+    }
+
+    /// The surface of a primitive.
+    pub fn surface(&self, primitive: u32) -> &Surface {
+        &self.surfaces[self.surface_of[primitive as usize] as usize]
+    }
+
+    /// True when the side on which `hit` was met absorbs all light.
+    pub fn absorbs(&self, hit: &Hit) -> bool {
+        !hit.front && !self.surface(hit.primitive).double_sided
+    }
+
+    /// Number of triangles.
+    pub fn triangles(&self) -> u64 {
+        self.geometry.triangles()
+    }
+
+    /// Memory of geometry and surfaces \[bytes\].
+    pub fn bytes(&self) -> u64 {
+        let surfaces = self.surfaces.len() * size_of::<Surface>() + 4 * self.surface_of.len();
+        self.geometry.bytes() + (surfaces + self.sources.emitters.len() * (size_of::<Emitter>() + 8)) as u64
+    }
+}
+
+/// Middle of the box around `positions`; the origin without any.
+fn middle(positions: &[DVec3]) -> DVec3 {
+    let empty = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    let (low, high) = positions.iter().fold(empty, |(low, high), &p| (low.min(p), high.max(p)));
+    if positions.is_empty() { DVec3::ZERO } else { 0.5 * (low + high) }
+}
+
+fn painted(surface: Surface, channels: Channels) -> Surface {
+    match channels {
+        Channels::Rgb => surface,
+        Channels::Luminance => Surface {
+            reflectance: surface.reflectance.grey(),
+            emission: Colour::grey(surface.emission.luminance()),
+            ..surface
+        },
+    }
+}
+
+fn analytic_surface(reflectance: f64) -> Surface {
+    Surface {
+        name: String::new(),
+        reflectance: Reflectance::Lambert(Colour::grey(reflectance)),
+        double_sided: false,
+        emission: Colour::BLACK,
+    }
+}
+
+fn spheres(job: &Job, offset: DVec3) -> Vec<Sphere> {
+    let sphere = |s: &job::Sphere| Sphere {
+        center: DVec3::from(s.center) + offset,
+        radius: s.radius,
+        inward: s.facing == job::Facing::Inward,
+    };
+    job.spheres.iter().map(sphere).collect()
+}
+
+fn planes(job: &Job, offset: DVec3) -> Vec<Plane> {
+    job.planes.iter().map(|p| Plane::new(DVec3::from(p.point) + offset, p.normal.into())).collect()
+}
+
+fn light(source: &job::Source) -> Light {
+    match *source {
+        job::Source::Omni { position, intensity } => {
+            Light::Omni { position: position.into(), intensity: Colour::grey(intensity) }
+        }
+    }
+}
+
+/// The area lights: one for each triangle of an emissive surface.
+fn emitters(geometry: &Geometry, surfaces: &[Surface], surface_of: &[u32]) -> Vec<Emitter> {
+    let lit = |primitive: &usize| !surfaces[surface_of[*primitive] as usize].emission.is_black();
+    let emitter = |primitive: usize| {
+        let surface = &surfaces[surface_of[primitive] as usize];
+        let [a, b, c] = geometry.triangle(primitive as u32);
+        let across = (b - a).cross(c - a);
+        Emitter {
+            corners: [a, b, c],
+            normal: across.normalize_or_zero(),
+            area: 0.5 * across.length(),
+            luminance: surface.emission,
+            double_sided: surface.double_sided,
+        }
+    };
+    (0..surface_of.len()).filter(lit).map(emitter).collect()
+}
+
+fn refuse_endless_flux(geometry: &Geometry, lights: &[Light]) -> Result<()> {
+    let parallel = lights.iter().any(|l| matches!(l, Light::Directional { .. }));
+    if parallel && geometry.is_unbounded() {
+        return Err(Error::input("scene", "plane", "infinite", "no [[plane]] together with a directional light"));
+    }
+    Ok(())
 }

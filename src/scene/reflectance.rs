@@ -51,6 +51,18 @@ impl Reflectance {
         }
     }
 
+    /// Directional albedo at the cosine of incidence.
+    pub fn albedo(&self, _cosine: f64) -> Colour {
+        match self {
+            Reflectance::Lambert(rho) => *rho,
+        }
+    }
+
+    /// Reflectance of the delta component at the cosine of incidence; `None` without one.
+    pub fn delta_reflectance(&self, _cosine: f64) -> Option<Colour> {
+        None
+    }
+
     /// True when part of the light is reflected by a delta component, which no connection can carry.
     pub fn has_delta(&self) -> bool {
         false

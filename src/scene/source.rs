@@ -1,7 +1,12 @@
-//! Light sources: flux, emission, direct light (docs/method.md, "Sources").
+//! Light sources: flux, choice, emission of histories (docs/method.md, "Sources").
+//!
+//! A history chooses its source in proportion to luminous flux and leaves it with the exact distribution of its
+//! emission, so every history starts with the same luminous weight: the flux of all sources together.
 
-use crate::math::DVec3;
+use crate::geometry::Geometry;
+use crate::math::{DVec3, PI, cbrt, cos, to_world};
 use crate::photometry::Colour;
+use crate::random::{Generator, around_z, cosine_hemisphere, disc, sphere};
 
 /// A light without extent, as a file or a job gives it.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,6 +40,242 @@ pub enum Light {
     },
 }
 
-/// All sources, area lights among them, with the choice in proportion to flux.
+impl Light {
+    /// The same light with its position moved by `offset`.
+    pub(super) fn moved(self, offset: DVec3) -> Self {
+        match self {
+            Light::Omni { position, intensity } => Light::Omni { position: position + offset, intensity },
+            Light::Spot { position, direction, intensity, inner, outer } => {
+                Light::Spot { position: position + offset, direction, intensity, inner, outer }
+            }
+            directional @ Light::Directional { .. } => directional,
+        }
+    }
+
+    /// The same light with its colour through `f`.
+    pub(super) fn recoloured(mut self, f: impl Fn(Colour) -> Colour) -> Self {
+        let (Light::Omni { intensity: colour, .. }
+        | Light::Spot { intensity: colour, .. }
+        | Light::Directional { illuminance: colour, .. }) = &mut self;
+        *colour = f(*colour);
+        self
+    }
+
+    /// Flux that enters the scene \[lm\]; of parallel light, through a disc of `radius` \[m\].
+    fn flux(&self, radius: f64) -> Colour {
+        match self {
+            Light::Omni { intensity, .. } => *intensity * (4.0 * PI),
+            Light::Spot { intensity, inner, outer, .. } => *intensity * Falloff::new(*inner, *outer).solid_angle(),
+            Light::Directional { illuminance, .. } => *illuminance * (PI * radius * radius),
+        }
+    }
+
+    /// Light that arrives unobstructed at `point`: the point it comes from, `None` from infinity; its propagation
+    /// direction; and the illuminance across that direction \[lx\].
+    pub fn at(&self, point: DVec3) -> (Option<DVec3>, DVec3, Colour) {
+        let from = |position: DVec3, intensity: Colour| {
+            let way = point - position;
+            (Some(position), way.normalize(), intensity / way.length_squared())
+        };
+        match *self {
+            Light::Omni { position, intensity } => from(position, intensity),
+            Light::Spot { position, direction, intensity, inner, outer } => {
+                let cosine = direction.dot((point - position).normalize());
+                from(position, intensity * Falloff::new(inner, outer).at(cosine))
+            }
+            Light::Directional { direction, illuminance } => (None, direction, illuminance),
+        }
+    }
+}
+
+/// Falloff of a spot, (scale (cos - cos_outer))^2 clamped to 1 (implementation note of KHR_lights_punctual).
+struct Falloff {
+    cos_outer: f64,
+    scale: f64,
+}
+
+impl Falloff {
+    fn new(inner: f64, outer: f64) -> Self {
+        let cos_outer = cos(outer);
+        Falloff { cos_outer, scale: 1.0 / (cos(inner) - cos_outer).max(0.001) }
+    }
+
+    fn at(&self, cosine: f64) -> f64 {
+        let a = ((cosine - self.cos_outer) * self.scale).clamp(0.0, 1.0);
+        a * a
+    }
+
+    /// Cosine from which on the intensity is full.
+    fn cos_full(&self) -> f64 {
+        (self.cos_outer + 1.0 / self.scale).min(1.0)
+    }
+
+    /// Integrals over azimuth and cosine of the ramp and of the full cone \[sr\].
+    fn parts(&self) -> (f64, f64) {
+        let ramp = self.cos_full() - self.cos_outer;
+        (2.0 * PI * self.scale * self.scale * ramp * ramp * ramp / 3.0, 2.0 * PI * (1.0 - self.cos_full()))
+    }
+
+    /// Flux over axial intensity \[sr\]: the quadrature of the falloff, in closed form.
+    fn solid_angle(&self) -> f64 {
+        let (ramp, full) = self.parts();
+        ramp + full
+    }
+
+    /// Cosine with density proportional to the falloff.
+    fn sample(&self, u: f64) -> f64 {
+        let (ramp, full) = self.parts();
+        let v = u * (ramp + full);
+        if v < ramp {
+            self.cos_outer + (self.cos_full() - self.cos_outer) * cbrt(v / ramp)
+        } else {
+            1.0 - (v - ramp) / (2.0 * PI)
+        }
+    }
+}
+
+/// An emissive triangle: a Lambert area light.
+#[derive(Clone, Debug)]
+pub struct Emitter {
+    /// Corners \[m\].
+    pub corners: [DVec3; 3],
+    /// Unit normal of the front.
+    pub normal: DVec3,
+    /// Area \[m2\].
+    pub area: f64,
+    /// Emitted luminance \[cd/m2\].
+    pub luminance: Colour,
+    /// True when the back emits as well.
+    pub double_sided: bool,
+}
+
+impl Emitter {
+    fn flux(&self) -> Colour {
+        self.luminance * (PI * self.area * if self.double_sided { 2.0 } else { 1.0 })
+    }
+
+    /// The point with barycentric coordinates uniform in area.
+    pub fn point(&self, u: crate::math::DVec2) -> DVec3 {
+        let [a, b, c] = self.corners;
+        let s = u.x.sqrt();
+        a * (1.0 - s) + b * (s * (1.0 - u.y)) + c * (s * u.y)
+    }
+}
+
+/// A history at its start.
+#[derive(Clone, Copy, Debug)]
+pub struct Emission {
+    /// Where the first ray starts \[m\].
+    pub origin: DVec3,
+    /// Its direction.
+    pub direction: DVec3,
+    /// W_1, the flux weight with which it arrives at the first vertex \[lm\].
+    pub weight: Colour,
+}
+
+/// All sources, with the choice in proportion to flux.
 #[derive(Clone, Debug, Default)]
-pub struct Sources {}
+pub struct Sources {
+    /// Lights without extent.
+    pub lights: Vec<Light>,
+    /// Emissive triangles.
+    pub emitters: Vec<Emitter>,
+    /// Running sum of luminous flux over lights, then emitters \[lm\].
+    cumulative: Vec<f64>,
+    /// Centre and radius of the sphere that parallel light must cover \[m\].
+    covered: (DVec3, f64),
+}
+
+impl Sources {
+    /// Joins `lights` and `emitters` over a scene bounded by `covered`; sources without flux are left out.
+    pub fn new(lights: Vec<Light>, emitters: Vec<Emitter>, covered: (DVec3, f64)) -> Self {
+        let lit = |flux: Colour| flux.luminance() > 0.0;
+        let lights: Vec<Light> = lights.into_iter().filter(|l| lit(l.flux(covered.1))).collect();
+        let emitters: Vec<Emitter> = emitters.into_iter().filter(|e| lit(e.flux())).collect();
+        let fluxes = lights.iter().map(|l| l.flux(covered.1)).chain(emitters.iter().map(Emitter::flux));
+        let cumulative = fluxes
+            .scan(0.0, |sum, flux| {
+                *sum += flux.luminance();
+                Some(*sum)
+            })
+            .collect();
+        Sources { lights, emitters, cumulative, covered }
+    }
+
+    /// Number of sources.
+    pub fn len(&self) -> usize {
+        self.cumulative.len()
+    }
+
+    /// True in the dark.
+    pub fn is_empty(&self) -> bool {
+        self.cumulative.is_empty()
+    }
+
+    /// Luminous flux of all sources \[lm\].
+    pub fn flux(&self) -> f64 {
+        self.cumulative.last().copied().unwrap_or(0.0)
+    }
+
+    /// Luminous flux of all emitters \[lm\].
+    fn emitter_flux(&self) -> f64 {
+        self.flux() - self.flux_before_emitters()
+    }
+
+    fn flux_before_emitters(&self) -> f64 {
+        if self.lights.is_empty() { 0.0 } else { self.cumulative[self.lights.len() - 1] }
+    }
+
+    /// Chooses an emitter in proportion to flux by `u` in [0, 1): the emitter and its probability.
+    pub fn choose_emitter(&self, u: f64) -> (&Emitter, f64) {
+        let first = self.lights.len();
+        let target = self.flux_before_emitters() + u * self.emitter_flux();
+        let chosen = self.cumulative[first..].partition_point(|&sum| sum <= target).min(self.emitters.len() - 1);
+        let emitter = &self.emitters[chosen];
+        (emitter, emitter.flux().luminance() / self.emitter_flux())
+    }
+
+    /// Starts a history. With a single source no number is drawn for the choice.
+    pub fn emit(&self, geometry: &Geometry, rng: &mut Generator) -> Emission {
+        let last = self.len() - 1;
+        let chosen = match last {
+            0 => 0,
+            _ => {
+                let target = rng.uniform() * self.flux();
+                self.cumulative.partition_point(|&sum| sum <= target).min(last)
+            }
+        };
+        let (origin, direction, flux) = match self.lights.get(chosen) {
+            Some(light) => self.emit_light(light, rng),
+            None => emit_triangle(&self.emitters[chosen - self.lights.len()], geometry, rng),
+        };
+        // flux over the probability of the choice: the colour of the source, the luminous flux of all.
+        Emission { origin, direction, weight: flux * (self.flux() / flux.luminance()) }
+    }
+
+    fn emit_light(&self, light: &Light, rng: &mut Generator) -> (DVec3, DVec3, Colour) {
+        let (center, radius) = self.covered;
+        let u = rng.uniform2();
+        let (origin, direction) = match light {
+            Light::Omni { position, .. } => (*position, sphere(u)),
+            Light::Spot { position, direction, inner, outer, .. } => {
+                let cosine = Falloff::new(*inner, *outer).sample(u.x);
+                (*position, to_world(*direction, around_z(cosine, u.y)))
+            }
+            Light::Directional { direction, .. } => {
+                let across = disc(u) * radius;
+                let start = DVec3::new(across.x, across.y, -2.0 * radius);
+                (center + to_world(*direction, start), *direction)
+            }
+        };
+        (origin, direction, light.flux(radius))
+    }
+}
+
+fn emit_triangle(emitter: &Emitter, geometry: &Geometry, rng: &mut Generator) -> (DVec3, DVec3, Colour) {
+    let point = emitter.point(rng.uniform2());
+    let back = emitter.double_sided && rng.uniform() < 0.5;
+    let normal = if back { -emitter.normal } else { emitter.normal };
+    let direction = to_world(normal, cosine_hemisphere(rng.uniform2()));
+    (geometry.lift(point, normal), direction, emitter.flux())
+}

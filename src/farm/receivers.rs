@@ -1,0 +1,270 @@
+//! Receiver sets: the bins of a camera, goniometer, grid or point as receivers, batch by batch.
+//!
+//! The bin of a map has one position in each of its strata and batch, for direct light; one of them, its stratum
+//! drawn anew each batch, carries the connections. A lux-meter stays where it is, and its direct light from lights
+//! without extent is computed once.
+
+use super::ordering::kd_order;
+use crate::error::{Error, Result};
+use crate::job::{Camera, Job, SetShape};
+use crate::math::{DVec2, DVec3};
+use crate::photometry::Colour;
+use crate::random::{Domain, Generator, Stream};
+use crate::scene::Scene;
+use crate::tally::Scores;
+use crate::transport::connection::{Connected, Connectors, connect};
+use crate::transport::direct::{emitter_samples, from_emitters, from_lights};
+use crate::transport::eye::{Eye, Gaze, latitude};
+use crate::transport::receiver::{Receiver, Response, Seen, look, look_at};
+use rayon::prelude::*;
+
+/// One receiver set of a job, placed in a scene.
+pub struct ReceiverSet {
+    shape: SetShape,
+    bins: Bins,
+    stream: Stream,
+    /// Bins in the order in which they share tiles.
+    order: Vec<u32>,
+    histories: u64,
+}
+
+/// What the bins are.
+enum Bins {
+    /// Film of an eye with `strata` x `strata` positions in a bin; no eye: nothing to see anywhere.
+    Film { eye: Option<Eye>, strata: u32 },
+    /// Lux-meters; `None` inside a solid.
+    Meters(Vec<Option<Receiver>>),
+}
+
+/// What the positions of one bin say in one batch.
+struct Sensed {
+    direct: Colour,
+    receiver: Option<Receiver>,
+    existed: bool,
+}
+
+/// Scores of the bins of one tile.
+pub struct TileScores(Vec<BinScore>);
+
+struct BinScore {
+    value: Colour,
+    direct: Colour,
+    peak: f64,
+    existed: bool,
+}
+
+impl ReceiverSet {
+    /// All receiver sets of `job` in the order of [`Job::sets`].
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a camera node that the scene has not.
+    pub fn all(job: &Job, scene: &Scene) -> Result<Vec<ReceiverSet>> {
+        let mut bins = Vec::new();
+        for camera in &job.cameras {
+            let eye = Some(camera_eye(scene, camera)?);
+            bins.push(Bins::Film { eye, strata: camera.pixel_samples.isqrt() });
+        }
+        for gonio in &job.gonios {
+            bins.push(Bins::Film { eye: Eye::from_gonio(scene, gonio), strata: gonio.pixel_samples.isqrt() });
+        }
+        for grid in &job.grids {
+            let normal = grid.normal;
+            let cells = 0..grid.columns as usize * grid.rows as usize;
+            bins.push(Bins::Meters(cells.map(|i| meter(scene, grid.position(i), normal)).collect()));
+        }
+        for point in &job.points {
+            bins.push(Bins::Meters(vec![meter(scene, point.position, point.normal)]));
+        }
+        Ok(job.sets().into_iter().zip(bins).map(|(shape, bins)| ReceiverSet::new(job, scene, shape, bins)).collect())
+    }
+
+    fn new(job: &Job, scene: &Scene, shape: SetShape, bins: Bins) -> Self {
+        let stream = Stream::new(job.run.seed, Domain::Receiver, &shape.name);
+        let histories = job.run.histories_per_batch;
+        let mut set = ReceiverSet { shape, bins, stream, order: Vec::new(), histories };
+        let centers: Vec<DVec3> = (0..set.shape.bins()).into_par_iter().map(|i| set.center(scene, i)).collect();
+        set.order = kd_order(&centers);
+        set
+    }
+
+    /// Name, size and keeping.
+    pub fn shape(&self) -> &SetShape {
+        &self.shape
+    }
+
+    /// Bins in the order in which they share tiles.
+    pub fn order(&self) -> &[u32] {
+        &self.order
+    }
+
+    /// Where the centre of bin `i` looks, for the order of the tiles alone; infinite where nothing is seen.
+    fn center(&self, scene: &Scene, i: usize) -> DVec3 {
+        match &self.bins {
+            Bins::Meters(meters) => meters[i].map_or(DVec3::INFINITY, |r| r.position),
+            Bins::Film { eye, .. } => match eye.as_ref().map(|e| e.gaze(self.film(i, 1, 0, DVec2::splat(0.5)))) {
+                Some(Gaze::Along(ray)) => scene.geometry.closest_hit(&ray).map_or(DVec3::INFINITY, |h| h.position),
+                Some(Gaze::At(hit, _)) => hit.position,
+                _ => DVec3::INFINITY,
+            },
+        }
+    }
+
+    /// What the job and the scene say differently about these receivers.
+    pub fn warnings(job: &Job, scene: &Scene) -> Vec<String> {
+        let differs = |camera: &Camera| {
+            let node = scene.cameras.iter().find(|c| Some(&c.name) == camera.node.as_ref())?;
+            let (asked, given) = (f64::from(camera.width) / f64::from(camera.height), node.aspect?);
+            ((asked / given - 1.0).abs() > 1e-3).then(|| {
+                format!("camera {}: aspectRatio {given} of the scene ignored, {asked} of the job used", camera.name)
+            })
+        };
+        job.cameras.iter().filter_map(differs).collect()
+    }
+
+    /// Direct light that is the same in every batch \[lx or cd/m2\]: of lux-meters the light of sources without
+    /// extent, NaN inside a solid; of a map NaN where no direction of a bin can ever be seen, or nothing at all.
+    pub fn fixed_direct(&self, scene: &Scene) -> Vec<f64> {
+        match &self.bins {
+            Bins::Meters(meters) => {
+                let fixed = |m: &Option<Receiver>| m.map_or(f64::NAN, |r| from_lights(scene, &r).luminance());
+                meters.par_iter().map(fixed).collect()
+            }
+            Bins::Film { eye: None, .. } => vec![f64::NAN; self.shape.bins()],
+            Bins::Film { eye: Some(Eye::Surface { .. }), .. } => {
+                (0..self.shape.bins()).map(|i| if self.is_below_horizon(i) { f64::NAN } else { 0.0 }).collect()
+            }
+            Bins::Film { .. } => Vec::new(),
+        }
+    }
+
+    /// True when all corners of the bin look from below a surface point.
+    fn is_below_horizon(&self, i: usize) -> bool {
+        let Bins::Film { eye: Some(eye), .. } = &self.bins else { return false };
+        let corners = [(0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (1.0, 1.0), (0.5, 0.5)];
+        corners.iter().all(|&(x, y)| matches!(eye.gaze(self.film(i, 1, 0, DVec2::new(x, y))), Gaze::Nowhere))
+    }
+
+    /// Film position, in the unit square, at the place `within` the stratum number `stratum` of the
+    /// `strata` x `strata` of bin `i`.
+    fn film(&self, i: usize, strata: u32, stratum: u32, within: DVec2) -> DVec2 {
+        let (width, height) = (self.shape.width as usize, f64::from(self.shape.height));
+        let (column, row) = ((i % width) as f64, (i / width) as f64);
+        let (across, down) = (f64::from(stratum % strata), f64::from(stratum / strata));
+        let x = (column + (across + within.x) / f64::from(strata)) / width as f64;
+        let v = (down + within.y) / f64::from(strata);
+        let y = match &self.bins {
+            Bins::Film { eye: Some(Eye::Sphere { .. } | Eye::Surface { .. }), .. } => {
+                latitude(row / height, (row + 1.0) / height, v)
+            }
+            _ => (row + v) / height,
+        };
+        DVec2::new(x, y)
+    }
+
+    /// Scores the bins of one tile against all histories of a batch.
+    pub fn score_tile(
+        &self,
+        scene: &Scene,
+        bins: &[u32],
+        batch: u64,
+        histories: &Connectors,
+        channels: usize,
+    ) -> TileScores {
+        let sensed: Vec<Sensed> = bins.iter().map(|&bin| self.sense(scene, bin as usize, batch)).collect();
+        let receivers: Vec<Receiver> = sensed.iter().filter_map(|s| s.receiver).collect();
+        let mut connected = connect(scene, histories, &receivers, channels).into_iter();
+        let score = |s: &Sensed| {
+            let Connected { sum, peak } = match s.receiver {
+                Some(_) => connected.next().expect("one result for each receiver"),
+                None => Connected::default(),
+            };
+            let value = s.direct + sum / self.histories as f64;
+            BinScore { value, direct: s.direct, peak, existed: s.existed }
+        };
+        TileScores(sensed.iter().map(score).collect())
+    }
+
+    /// Direct light and receiver of one bin in one batch.
+    fn sense(&self, scene: &Scene, bin: usize, batch: u64) -> Sensed {
+        let mut rng = self.stream.generator(batch * self.shape.bins() as u64 + bin as u64);
+        match &self.bins {
+            Bins::Meters(meters) => self.sense_meter(scene, meters[bin].as_ref(), &mut rng),
+            Bins::Film { eye: Some(eye), strata } => self.sense_film(scene, eye, *strata, bin, &mut rng),
+            Bins::Film { eye: None, .. } => Sensed { direct: Colour::BLACK, receiver: None, existed: false },
+        }
+    }
+
+    fn sense_meter(&self, scene: &Scene, meter: Option<&Receiver>, rng: &mut Generator) -> Sensed {
+        let samples = emitter_samples(self.histories);
+        let direct = meter.map_or(Colour::BLACK, |r| from_emitters(scene, r, samples, rng));
+        Sensed { direct, receiver: meter.copied(), existed: meter.is_some() }
+    }
+
+    fn sense_film(&self, scene: &Scene, eye: &Eye, strata: u32, bin: usize, rng: &mut Generator) -> Sensed {
+        let positions = strata * strata;
+        let samples = emitter_samples(self.histories).div_ceil(u64::from(positions));
+        let carrying = rng.below(positions);
+        let mut sensed = Sensed { direct: Colour::BLACK, receiver: None, existed: false };
+        for stratum in 0..positions {
+            let film = self.film(bin, strata, stratum, rng.uniform2());
+            let seen = gaze(scene, eye, film, rng);
+            sensed.direct += seen.emitted;
+            if let Some(receiver) = &seen.receiver {
+                sensed.direct += from_lights(scene, receiver) + from_emitters(scene, receiver, samples, rng);
+                sensed.existed = true;
+            }
+            if stratum == carrying {
+                sensed.receiver = seen.receiver;
+            }
+        }
+        sensed.direct = sensed.direct / f64::from(positions);
+        sensed
+    }
+}
+
+fn gaze(scene: &Scene, eye: &Eye, film: DVec2, rng: &mut Generator) -> Seen {
+    match eye.gaze(film) {
+        Gaze::Along(ray) => look(scene, &ray, rng),
+        Gaze::At(hit, direction) => look_at(scene, hit, direction, rng),
+        Gaze::Nowhere => Seen { emitted: Colour::BLACK, receiver: None },
+    }
+}
+
+fn camera_eye(scene: &Scene, camera: &Camera) -> Result<Eye> {
+    let aspect = f64::from(camera.width) / f64::from(camera.height);
+    let Some(name) = &camera.node else {
+        let view = camera.view().expect("a job is checked when it is read");
+        return Ok(Eye::from_view(scene, &view, aspect));
+    };
+    match scene.cameras.iter().find(|c| c.name == *name) {
+        Some(node) => Ok(Eye::from_node(node, aspect)),
+        None => {
+            let names: Vec<_> = scene.cameras.iter().map(|c| c.name.as_str()).collect();
+            let allowed = format!("a perspective camera of the scene: {}", names.join(", "));
+            Err(Error::input("job", format!("camera {} node", camera.name), name, allowed))
+        }
+    }
+}
+
+fn meter(scene: &Scene, position: [f64; 3], normal: [f64; 3]) -> Option<Receiver> {
+    let (position, normal) = (scene.place(position), DVec3::from(normal).normalize());
+    let lifted = scene.geometry.lift(position, normal);
+    let inside = scene.geometry.is_inside(lifted, |hit| scene.absorbs(hit));
+    (!inside).then_some(Receiver { position, normal, response: Response::Cosine })
+}
+
+impl TileScores {
+    /// Writes the scores of `bins` to their places.
+    pub fn scatter(self, bins: &[u32], scores: &mut Scores) {
+        for (&bin, score) in bins.iter().zip(self.0) {
+            let bin = bin as usize;
+            scores.value[bin] = score.value.luminance();
+            scores.direct[bin] = score.direct.luminance();
+            scores.peak[bin] = score.peak;
+            scores.existed[bin] = score.existed;
+            if let Some(colour) = scores.colour.get_mut(bin) {
+                *colour = score.value.0;
+            }
+        }
+    }
+}

@@ -1,0 +1,138 @@
+//! Triangles in f32 under a binary bounding volume hierarchy of `obvhs`.
+//!
+//! No ray slips between triangles that share bit-identical corners: the three edge functions of a triangle are
+//! triple products in f64 of f32 corners, and swapping the ends of an edge changes exactly their sign, so the two
+//! neighbours of an edge agree about the side on which a ray passes; a ray on the edge meets both. The boxes of
+//! the hierarchy are inflated by more than its f32 slab test rounds.
+
+use super::{Hit, Ray, hit};
+use crate::math::{DVec3, Vec3};
+use glam::Vec3A;
+use obvhs::BvhBuildParams;
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::{Bvh2, builder::build_bvh2};
+use obvhs::ray::{Ray as BoxRay, RayHit};
+
+/// Triangles and their hierarchy.
+pub struct Mesh {
+    /// Corners in the order of the leaves of the hierarchy.
+    corners: Vec<[Vec3; 3]>,
+    /// Primitive number of each of `corners`.
+    primitive: Vec<u32>,
+    /// Where each primitive stands in `corners`.
+    place: Vec<u32>,
+    bvh: Bvh2,
+    bounds: (DVec3, DVec3),
+}
+
+impl Default for Mesh {
+    fn default() -> Self {
+        Mesh::new(&[])
+    }
+}
+
+impl Mesh {
+    /// Builds the hierarchy over `triangles` \[m\], counter-clockwise seen from the front.
+    pub fn new(triangles: &[[Vec3; 3]]) -> Self {
+        let empty = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let bounds = triangles.iter().flatten().fold(empty, |(low, high), p| {
+            let p = p.as_dvec3();
+            (low.min(p), high.max(p))
+        });
+        let bvh = build(triangles, bounds);
+        let primitive = bvh.primitive_indices.clone();
+        let mut place = vec![0; triangles.len()];
+        for (at, &p) in primitive.iter().enumerate() {
+            place[p as usize] = at as u32;
+        }
+        Mesh { corners: primitive.iter().map(|&p| triangles[p as usize]).collect(), primitive, place, bvh, bounds }
+    }
+
+    /// Number of triangles.
+    pub fn len(&self) -> usize {
+        self.corners.len()
+    }
+
+    /// True without triangles.
+    pub fn is_empty(&self) -> bool {
+        self.corners.is_empty()
+    }
+
+    /// Memory \[bytes\].
+    pub fn bytes(&self) -> u64 {
+        (size_of_val(&self.corners[..]) + 12 * self.corners.len() + size_of_val(&self.bvh.nodes[..])) as u64
+    }
+
+    pub(super) fn bounds(&self) -> (DVec3, DVec3) {
+        self.bounds
+    }
+
+    pub(super) fn triangle(&self, primitive: u32) -> [DVec3; 3] {
+        self.corners[self.place[primitive as usize] as usize].map(|p| p.as_dvec3())
+    }
+
+    pub(super) fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+        // Boxes and triangles must see the same ray, or a ray could pass between a box and its triangle.
+        let (origin, direction) = (ray.origin.as_vec3a(), ray.direction.as_vec3a());
+        let (o, d) = (origin.as_dvec3(), direction.as_dvec3());
+        let mut best: Option<(f64, u32)> = None;
+        let box_ray = BoxRay::new_inf(origin, direction);
+        self.bvh.ray_traverse(box_ray, &mut RayHit::none(), |_, at| {
+            let Some(t) = intersect(&self.corners[at], o, d) else { return f32::INFINITY };
+            let found = (t, self.primitive[at]);
+            if best.is_none_or(|b| found < b) {
+                best = Some(found);
+            }
+            // Rounded up: a box that begins at this very distance may hold a lower primitive number.
+            (t * (1.0 + 1e-6)) as f32
+        });
+        let (distance, primitive) = best?;
+        let [a, b, c] = self.triangle(primitive);
+        let normal = (b - a).cross(c - a).normalize();
+        let near = ray.origin + distance * ray.direction;
+        let position = near - normal.dot(near - a) * normal;
+        Some(Hit { primitive, ..hit(ray, distance, position, normal) })
+    }
+
+    /// True when a triangle crosses the segment from `a` to `b`, ends excluded.
+    pub(super) fn blocks(&self, a: Vec3, b: Vec3) -> bool {
+        let (o, d) = (a.as_dvec3(), (b - a).as_dvec3());
+        let box_ray = BoxRay::new(a.into(), (b - a).into(), 0.0, 1.0);
+        !self.bvh.ray_traverse_miss(box_ray, |_, at| match intersect(&self.corners[at], o, d) {
+            Some(t) if t < 1.0 => 0.0,
+            _ => f32::INFINITY,
+        })
+    }
+}
+
+fn build(triangles: &[[Vec3; 3]], bounds: (DVec3, DVec3)) -> Bvh2 {
+    if triangles.is_empty() {
+        return Bvh2::default();
+    }
+    // Twice the scene is the longest way of a ray inside it; 8 roundings of that are more than a slab test makes.
+    let size = bounds.0.abs().max(bounds.1.abs()).max_element() + (bounds.1 - bounds.0).length();
+    let margin = Vec3A::splat((8.0 / f64::from(1 << 24) * 2.0 * size) as f32);
+    let boxes: Vec<Aabb> = triangles
+        .iter()
+        .map(|t| {
+            let tight = Aabb::from_points(&t.map(Vec3A::from));
+            Aabb::new(tight.min - margin, tight.max + margin)
+        })
+        .collect();
+    build_bvh2(&boxes, BvhBuildParams::medium_build(), &mut Default::default())
+}
+
+/// Parameter t > 0 at which the line o + t d crosses the triangle, edges included.
+fn intersect(corners: &[Vec3; 3], o: DVec3, d: DVec3) -> Option<f64> {
+    let [v0, v1, v2] = corners.map(|p| p.as_dvec3());
+    let (a, b, c) = (v0 - o, v1 - o, v2 - o);
+    let edges = [d.dot(c.cross(b)), d.dot(a.cross(c)), d.dot(b.cross(a))];
+    let one_side = edges.iter().all(|&e| e >= 0.0) || edges.iter().all(|&e| e <= 0.0);
+    if !one_side {
+        return None;
+    }
+    let normal = (v1 - v0).cross(v2 - v0);
+    let t = normal.dot(a) / normal.dot(d);
+    // Edge-on the quotient is infinite or undefined: a triangle seen edge-on is not there.
+    (t > 0.0 && t.is_finite()).then_some(t)
+}

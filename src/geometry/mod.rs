@@ -1,0 +1,169 @@
+//! Where surfaces are: the first hit of a ray, and whether two points see each other.
+//!
+//! Coordinates are re-centred metres: the middle of the bounded geometry is the origin, so that f32 keeps its
+//! digits. Triangles live in f32 behind a [`Mesh`]; infinite planes and spheres are exact in f64. Geometry knows
+//! nothing of light, reflectance or pixels: a surface point is a primitive number, a position and a normal.
+//!
+//! Segments of visibility run between *lifted* points: each surface point is moved off its surface once, whatever
+//! it is connected to, by 16 2^-24 (max |p| + D), with D the diagonal of the bounded geometry, or |p| itself where a
+//! point on an infinite plane lies farther out. That is a few roundings of an f32 coordinate; the distance, cosines
+//! and geometric factor of a connection use the points themselves.
+
+mod mesh;
+mod plane;
+mod sphere;
+
+pub use mesh::Mesh;
+pub use plane::Plane;
+pub use sphere::Sphere;
+
+use crate::math::{DVec3, Vec3};
+
+/// Lift of a surface point in units of its coordinate size.
+const LIFT: f64 = 16.0 / (1u64 << 24) as f64;
+
+/// A half line; `direction` is a unit vector.
+#[derive(Clone, Copy, Debug)]
+pub struct Ray {
+    /// Start \[m\].
+    pub origin: DVec3,
+    /// Unit vector.
+    pub direction: DVec3,
+}
+
+/// A point of a surface met by a ray.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Distance from the start of the ray \[m\].
+    pub distance: f64,
+    /// The point, on the surface to f64 accuracy \[m\].
+    pub position: DVec3,
+    /// Unit geometric normal on the side of the ray.
+    pub normal: DVec3,
+    /// True when the ray came from the front.
+    pub front: bool,
+    /// Triangles first, then spheres, then planes.
+    pub primitive: u32,
+}
+
+/// All surfaces of a scene.
+#[derive(Default)]
+pub struct Geometry {
+    mesh: Mesh,
+    spheres: Vec<Sphere>,
+    planes: Vec<Plane>,
+    /// max |p| + D of the bounded geometry \[m\].
+    extent: f64,
+}
+
+impl Geometry {
+    /// Joins triangles, spheres and planes; coordinates are re-centred already.
+    pub fn new(mesh: Mesh, spheres: Vec<Sphere>, planes: Vec<Plane>) -> Self {
+        let mut bounds = mesh.bounds();
+        for s in &spheres {
+            bounds = union(bounds, (s.center - s.radius, s.center + s.radius));
+        }
+        let (low, high) = bounds;
+        let extent =
+            if low.x <= high.x { low.abs().max(high.abs()).max_element() + (high - low).length() } else { 1.0 };
+        Geometry { mesh, spheres, planes, extent }
+    }
+
+    /// Number of triangles.
+    pub fn triangles(&self) -> u64 {
+        self.mesh.len() as u64
+    }
+
+    /// Memory of triangles and acceleration structure \[bytes\].
+    pub fn bytes(&self) -> u64 {
+        self.mesh.bytes()
+    }
+
+    /// Corners of the triangle `primitive` \[m\], as the rays see it.
+    pub fn triangle(&self, primitive: u32) -> [DVec3; 3] {
+        self.mesh.triangle(primitive)
+    }
+
+    /// True when there are surfaces without bounds.
+    pub fn is_unbounded(&self) -> bool {
+        !self.planes.is_empty()
+    }
+
+    /// Centre and radius of a sphere around all bounded geometry \[m\].
+    pub fn bounding_sphere(&self) -> (DVec3, f64) {
+        let spheres = self.spheres.iter().map(|s| (s.center - s.radius, s.center + s.radius));
+        let (low, high) = spheres.fold(self.mesh.bounds(), union);
+        if low.x > high.x { (DVec3::ZERO, 0.0) } else { (0.5 * (low + high), 0.5 * (high - low).length()) }
+    }
+
+    /// The first surface along `ray`; equal distances go to the lower primitive number.
+    pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+        let mut best = self.mesh.closest_hit(ray);
+        let mut number = self.mesh.len() as u32;
+        let mut offer = |found: Option<Hit>| {
+            if let Some(hit) = found
+                && best.is_none_or(|b| hit.distance < b.distance)
+            {
+                best = Some(Hit { primitive: number, ..hit });
+            }
+            number += 1;
+        };
+        self.spheres.iter().for_each(|s| offer(s.hit(ray)));
+        self.planes.iter().for_each(|p| offer(p.hit(ray)));
+        best
+    }
+
+    /// The point `position` lifted off the surface along `normal`, as the start of rays and segments \[m\].
+    pub fn lift(&self, position: DVec3, normal: DVec3) -> DVec3 {
+        position + normal * (LIFT * self.extent.max(position.abs().max_element()))
+    }
+
+    /// True when no surface crosses the segment between two lifted points.
+    pub fn visible(&self, a: Vec3, b: Vec3) -> bool {
+        self.planes.iter().all(|p| !p.blocks(a, b))
+            && self.spheres.iter().all(|s| !s.blocks(a, b))
+            && !self.mesh.blocks(a, b)
+    }
+
+    /// Sets `factors[i]` to 0 where the segment from `apex` to `points[i]` is blocked; what is 0 is not looked at.
+    ///
+    /// This is the whole interface of the hot kernel: one lifted vertex against a tile of lifted receivers.
+    pub fn shadow(&self, apex: Vec3, points: &[Vec3], factors: &mut [f32]) {
+        for (factor, &point) in factors.iter_mut().zip(points) {
+            if *factor != 0.0 && !self.visible(apex, point) {
+                *factor = 0.0;
+            }
+        }
+    }
+
+    /// True when the first surface along each of 14 fixed directions is met from behind, on a side that `absorbs`:
+    /// the point lies inside a solid.
+    pub fn is_inside(&self, point: DVec3, absorbs: impl Fn(&Hit) -> bool) -> bool {
+        probe_directions().all(|direction| {
+            let hit = self.closest_hit(&Ray { origin: point, direction });
+            hit.is_some_and(|h| !h.front && absorbs(&h))
+        })
+    }
+}
+
+/// The axes and the diagonals of a cube, turned a little so that no probe runs along a wall.
+fn probe_directions() -> impl Iterator<Item = DVec3> {
+    let corners = [-1.0, 1.0];
+    let axes = [DVec3::X, DVec3::Y, DVec3::Z].into_iter().flat_map(|a| [a, -a]);
+    let diagonals = corners
+        .into_iter()
+        .flat_map(move |x| corners.into_iter().flat_map(move |y| corners.map(|z| DVec3::new(x, y, z))));
+    let tilt = DVec3::new(0.0131, -0.0071, 0.0173);
+    axes.chain(diagonals).map(move |d| (d.normalize() + tilt).normalize())
+}
+
+fn union(a: (DVec3, DVec3), b: (DVec3, DVec3)) -> (DVec3, DVec3) {
+    (a.0.min(b.0), a.1.max(b.1))
+}
+
+/// The hit at `distance` of a surface with unit normal `normal` (front side) and `position`; the number of the
+/// primitive is filled in by [`Geometry`].
+fn hit(ray: &Ray, distance: f64, position: DVec3, normal: DVec3) -> Hit {
+    let front = ray.direction.dot(normal) < 0.0;
+    Hit { distance, position, normal: if front { normal } else { -normal }, front, primitive: 0 }
+}

@@ -1,0 +1,130 @@
+//! Receivers: a point, a normal and a response, whatever measures there.
+//!
+//! A lux-meter's response is 1 (its cosine stands in the geometric factor); the response of a point seen by an eye
+//! is f(r; u -> l), times what mirrors on the way to the eye leave of it. Pixels, goniometer directions and grid
+//! points differ in nothing else.
+
+use crate::geometry::{Hit, Ray};
+use crate::math::{DVec3, PI};
+use crate::photometry::Colour;
+use crate::random::Generator;
+use crate::scene::{Reflectance, Scene};
+
+/// Mirrors that an eye ray follows before it is given up; facing perfect mirrors would be followed for ever.
+const MAX_MIRRORS: u32 = 256;
+
+/// A point (and direction) where the quantity is wanted.
+#[derive(Clone, Copy, Debug)]
+pub struct Receiver {
+    /// Position \[m\].
+    pub position: DVec3,
+    /// Unit normal; only light from its side counts.
+    pub normal: DVec3,
+    /// What arriving light is worth.
+    pub response: Response,
+}
+
+/// What light that arrives at a receiver is worth.
+#[derive(Clone, Copy, Debug)]
+pub enum Response {
+    /// Illuminance: 1.
+    Cosine,
+    /// Luminance towards an eye: f(r; u -> l) times `attenuation` \[1/sr\].
+    Reflectance {
+        /// The surface seen.
+        primitive: u32,
+        /// l, from the receiver to the eye or the last mirror.
+        to_eye: DVec3,
+        /// What the mirrors on the way to the eye reflect, over the probability of having followed them.
+        attenuation: Colour,
+    },
+}
+
+impl Response {
+    /// The response where it does not depend on the direction of arrival: of lux-meters and Lambert surfaces.
+    pub fn constant(&self, scene: &Scene) -> Option<Colour> {
+        match self {
+            Response::Cosine => Some(Colour::WHITE),
+            Response::Reflectance { primitive, attenuation, .. } => {
+                let rho = scene.surface(*primitive).reflectance.lambert()?;
+                Some(rho * *attenuation / PI)
+            }
+        }
+    }
+
+    /// The response to light with propagation direction `w_in` at a receiver with `normal`.
+    pub fn to(&self, scene: &Scene, normal: DVec3, w_in: DVec3) -> Colour {
+        match self {
+            Response::Cosine => Colour::WHITE,
+            Response::Reflectance { primitive, to_eye, attenuation } => {
+                scene.surface(*primitive).reflectance.evaluate(normal, w_in, *to_eye) * *attenuation
+            }
+        }
+    }
+}
+
+/// What an eye ray meets.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen {
+    /// L0: emission of the surfaces seen, behind mirrors too \[cd/m2\].
+    pub emitted: Colour,
+    /// The reflecting surface point where luminance is wanted.
+    pub receiver: Option<Receiver>,
+}
+
+/// Follows an eye ray over mirrors to the first point with a finite law of reflection.
+pub fn look(scene: &Scene, ray: &Ray, rng: &mut Generator) -> Seen {
+    match scene.geometry.closest_hit(ray) {
+        Some(hit) => look_at(scene, hit, ray.direction, rng),
+        None => Seen { emitted: Colour::BLACK, receiver: None },
+    }
+}
+
+/// The same for an eye ray with `direction` that has met `hit`.
+///
+/// At a surface that has both a mirror and a finite part one of them is drawn, in proportion to their reflectance.
+pub fn look_at(scene: &Scene, mut hit: Hit, mut direction: DVec3, rng: &mut Generator) -> Seen {
+    let mut seen = Seen { emitted: Colour::BLACK, receiver: None };
+    let mut attenuation = Colour::WHITE;
+    for _ in 0..MAX_MIRRORS {
+        if scene.absorbs(&hit) {
+            break;
+        }
+        let surface = scene.surface(hit.primitive);
+        seen.emitted += attenuation * surface.emission;
+        let cosine = -direction.dot(hit.normal);
+        let mirror = surface.reflectance.delta_reflectance(cosine);
+        let follow = mirror.map_or(0.0, |f| follow_probability(&surface.reflectance, f, cosine));
+        // Without a choice no number is drawn.
+        let stops = follow == 0.0 || (follow < 1.0 && rng.uniform() >= follow);
+        if stops {
+            seen.receiver = receiver(scene, &hit, direction, attenuation / (1.0 - follow));
+            break;
+        }
+        attenuation = attenuation * mirror.unwrap_or(Colour::BLACK) / follow;
+        direction = (direction + 2.0 * cosine * hit.normal).normalize();
+        let origin = scene.geometry.lift(hit.position, hit.normal);
+        match scene.geometry.closest_hit(&Ray { origin, direction }) {
+            Some(next) => hit = next,
+            None => break,
+        }
+    }
+    seen
+}
+
+/// The receiver at `hit`, if the surface there reflects.
+fn receiver(scene: &Scene, hit: &Hit, direction: DVec3, attenuation: Colour) -> Option<Receiver> {
+    let response = Response::Reflectance { primitive: hit.primitive, to_eye: -direction, attenuation };
+    let reflects = !scene.surface(hit.primitive).reflectance.is_black();
+    reflects.then_some(Receiver { position: hit.position, normal: hit.normal, response })
+}
+
+/// Probability of following the mirror with reflectance `f` rather than stopping at the finite part.
+fn follow_probability(reflectance: &Reflectance, f: Colour, cosine: f64) -> f64 {
+    if reflectance.is_black() {
+        return 1.0;
+    }
+    let (mirror, all) = (f.luminance(), reflectance.albedo(cosine).luminance());
+    // Neither branch may become so rare that its weight grows without bound.
+    if all > 0.0 { (mirror / all).clamp(0.1, 0.9) } else { 0.5 }
+}

@@ -1,0 +1,115 @@
+//! The Markov chain of one history: vertices with the weights that arrive at them.
+//!
+//! A vertex is scored before it is decided whether the history goes on, so its weight is the one that arrives.
+//! The flux balance counts, in luminous flux, what each event takes: what a surface does not reflect is absorbed,
+//! what meets nothing has escaped, what a numerical guard stopped is lost. Russian roulette takes nothing on
+//! average, so emitted = absorbed + escaped + lost holds within the error of the roulette alone.
+
+use crate::geometry::Ray;
+use crate::job::{Roulette, Transport};
+use crate::math::DVec3;
+use crate::photometry::Colour;
+use crate::random::Generator;
+use crate::scene::Scene;
+
+/// Guard against chains that never end (a closed scene that absorbs nothing): more vertices are lost flux.
+const MAX_VERTICES: u32 = 1 << 16;
+
+/// One surface point of a trajectory that can be connected to receivers.
+#[derive(Clone, Copy, Debug)]
+pub struct Vertex {
+    /// Position \[m\].
+    pub position: DVec3,
+    /// Unit geometric normal on the side on which the light arrived.
+    pub normal: DVec3,
+    /// Propagation direction of the arriving light.
+    pub w_in: DVec3,
+    /// W_n, the flux weight arriving \[lm\].
+    pub weight: Colour,
+    /// The surface it lies on.
+    pub primitive: u32,
+    /// n: reflections that light scattered here has seen, this one included.
+    pub order: u32,
+}
+
+/// Luminous flux of one or more histories by its fate \[lm\].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FluxBalance {
+    /// Left the sources.
+    pub emitted: f64,
+    /// Not reflected by a surface.
+    pub absorbed: f64,
+    /// Met no surface.
+    pub escaped: f64,
+    /// Stopped by a numerical guard.
+    pub lost: f64,
+    /// Met a delta scatterer (a mirror), where vertices do not score.
+    pub met_delta: f64,
+}
+
+impl FluxBalance {
+    /// Adds the balance of another history.
+    pub fn add(&mut self, other: &FluxBalance) {
+        self.emitted += other.emitted;
+        self.absorbed += other.absorbed;
+        self.escaped += other.escaped;
+        self.lost += other.lost;
+        self.met_delta += other.met_delta;
+    }
+}
+
+/// Traces one history; its vertices are appended to `vertices`.
+pub fn trace(scene: &Scene, transport: &Transport, rng: &mut Generator, vertices: &mut Vec<Vertex>) -> FluxBalance {
+    let start = scene.sources.emit(&scene.geometry, rng);
+    let first = start.weight.luminance();
+    let mut flux = FluxBalance { emitted: first, ..FluxBalance::default() };
+    let mut ray = Ray { origin: start.origin, direction: start.direction };
+    let mut weight = start.weight;
+    for order in 1..=MAX_VERTICES {
+        let Some(hit) = scene.geometry.closest_hit(&ray) else {
+            flux.escaped += weight.luminance();
+            return flux;
+        };
+        if scene.absorbs(&hit) {
+            flux.absorbed += weight.luminance();
+            return flux;
+        }
+        let reflectance = &scene.surface(hit.primitive).reflectance;
+        if !reflectance.is_black() {
+            let (position, normal, w_in) = (hit.position, hit.normal, ray.direction);
+            vertices.push(Vertex { position, normal, w_in, weight, primitive: hit.primitive, order });
+        }
+        if reflectance.has_delta() {
+            flux.met_delta += weight.luminance();
+        }
+        let Some(scattered) = reflectance.sample(hit.normal, ray.direction, rng) else {
+            flux.absorbed += weight.luminance();
+            return flux;
+        };
+        let reflected = weight * scattered.factor;
+        flux.absorbed += weight.luminance() - reflected.luminance();
+        let Some(survivor) = play(transport.roulette_below, first, weight, reflected, rng) else {
+            return flux;
+        };
+        weight = survivor;
+        ray = Ray { origin: scene.geometry.lift(hit.position, hit.normal), direction: scattered.direction };
+    }
+    flux.lost += weight.luminance();
+    flux
+}
+
+/// Russian roulette: the weight with which the history goes on, `reflected` over its survival probability, or
+/// `None` where it ends. `first` is the luminous weight W_1, `weight` the W_n that arrived.
+fn play(roulette: Roulette, first: f64, weight: Colour, reflected: Colour, rng: &mut Generator) -> Option<Colour> {
+    let survival = match roulette {
+        Roulette::Below(below) => weight.luminance() / (below * first),
+        Roulette::Analog(_) => reflected.luminance() / weight.luminance(),
+    };
+    if reflected.is_black() {
+        return None;
+    }
+    if survival >= 1.0 {
+        return Some(reflected);
+    }
+    (rng.uniform() < survival).then(|| reflected / survival)
+}
