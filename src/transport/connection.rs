@@ -159,7 +159,6 @@ impl<'a> Tile<'a> {
         }
     }
 
-    #[expect(clippy::needless_range_loop, reason = "six columns run in step")]
     /// Geometric factors G without visibility; 0 where vertex or receiver faces away \[1/m2\].
     fn factors(&self, vertex: &Connector, factors: &mut [f32]) {
         let (p, n) = (vertex.position, vertex.normal);

@@ -6,7 +6,8 @@ pub mod scenes;
 use lampyris::farm::realization::Realization;
 use lampyris::job::Job;
 use lampyris::scene::{Model, Scene};
-use lampyris::tally::statistics::{Estimate, student_quantile};
+pub use lampyris::tally::statistics::Estimate;
+use lampyris::tally::statistics::student_quantile;
 use lampyris::tally::{BatchScores, FLUX_BINS};
 use std::ops::Range;
 
@@ -26,7 +27,8 @@ pub struct Case {
 impl Case {
     /// A job given as TOML, over `model`.
     pub fn new(toml: &str, model: Model) -> Case {
-        let job = Job::parse(toml, "test.toml").unwrap();
+        let named = if model.triangles.is_empty() { "" } else { "scene = \"in memory\"\n" };
+        let job = Job::parse(&format!("{named}{toml}"), "test.toml").unwrap();
         let scene = Scene::new(model, &job).unwrap();
         Case { job, scene }
     }
