@@ -18,9 +18,9 @@ use crate::math::{DVec3, PI, acos, cos, sin_cos};
 /// Intervals of the table.
 const INTERVALS: usize = 128;
 /// Points of the Gauss-Legendre rule over the polar angle of the cap.
-const POLAR: usize = 96;
+const POLAR: usize = 32;
 /// Points of the midpoint rule over half the azimuth (the integrand is even and periodic).
-const AZIMUTHS: usize = 16;
+const AZIMUTHS: usize = 32;
 
 /// A and B, or their means.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -87,7 +87,7 @@ impl Reflectance {
         }
     }
 
-    /// Directional albedo at the cosine of incidence, delta components included; at most one, and within 2e-4 of
+    /// Directional albedo at the cosine of incidence, delta components included; at most one, and within 5e-4 of
     /// the integral of the law (the error of the table).
     pub fn albedo(&self, cosine: f64) -> Colour {
         match self {
