@@ -1,0 +1,151 @@
+//! Laws of reflection. f = sigma/pi \[1/sr\]; directions are propagation directions of light.
+//!
+//! The interface is two-sided: `normal` is the surface normal on the side on which light arrives
+//! (`w_in . normal < 0`), `w_out` may lie on either side of it. Every law here returns zero below the surface and
+//! is reciprocal: f(w_in -> w_out) = f(-w_out -> -w_in), bit for bit.
+//!
+//! A law may have a delta component, a mirror: `evaluate` and `pdf` leave it out, `sample` draws it and says so,
+//! `delta_reflectance` is its reflectance. Knows no geometry, no receivers and no wavelengths beyond three channels.
+
+mod albedo;
+mod glossy;
+mod microfacet;
+
+use crate::math::{DVec3, PI, to_world};
+use crate::photometry::Colour;
+use crate::random::{Generator, cosine_hemisphere};
+use glossy::Glossy;
+
+/// How a surface reflects.
+#[derive(Clone, Debug)]
+pub enum Reflectance {
+    /// The same luminance in all directions; f = rho/pi.
+    Lambert(Colour),
+    /// A specular part, rough or a mirror, over a diffuse one; from [`Reflectance::metallic_roughness`].
+    Glossy(Box<Glossy>),
+}
+
+/// A sampled continuation of a trajectory.
+#[derive(Clone, Copy, Debug)]
+pub struct Scattered {
+    /// New propagation direction.
+    pub direction: DVec3,
+    /// f |cos| / pdf, the factor on the weight.
+    pub factor: Colour,
+    /// True when a delta component was chosen (a mirror).
+    pub delta: bool,
+}
+
+impl Reflectance {
+    /// The metallic-roughness law of glTF, made reciprocal and conserving energy (its own mix of a diffuse and a
+    /// specular part is replaced: it reflects up to 1.3 times the light received).
+    ///
+    /// `metallic == 0.0 && roughness == 1.0` exactly is Lambert with `base` as its reflectance: the way a file says
+    /// "matt". Anything else is GGX with alpha = roughness^2 and Schlick's Fresnel factor over the diffuse part; alpha
+    /// below 1e-3 is a mirror. Building the law integrates its albedo table, a few milliseconds.
+    ///
+    /// # Panics
+    /// When an argument lies outside 0 ..= 1: the reader of a file checks first.
+    pub fn metallic_roughness(base: Colour, metallic: f64, roughness: f64) -> Self {
+        let allowed = |x: f64| (0.0..=1.0).contains(&x);
+        assert!(base.0.into_iter().all(allowed), "base colour outside 0 ..= 1: {base:?}");
+        assert!(allowed(metallic) && allowed(roughness), "metallic or roughness outside 0 ..= 1");
+        if metallic == 0.0 && roughness == 1.0 {
+            Reflectance::Lambert(base)
+        } else {
+            Reflectance::Glossy(Box::new(Glossy::new(base, metallic, roughness * roughness)))
+        }
+    }
+
+    /// f(w_in -> w_out) \[1/sr\] without delta components.
+    pub fn evaluate(&self, normal: DVec3, w_in: DVec3, w_out: DVec3) -> Colour {
+        match self {
+            Reflectance::Lambert(rho) if above(normal, w_in, w_out) => *rho / PI,
+            Reflectance::Lambert(_) => Colour::BLACK,
+            Reflectance::Glossy(law) => law.evaluate(normal, w_in, w_out),
+        }
+    }
+
+    /// Draws a continuation; `None` when nothing is reflected (the weight is absorbed).
+    pub fn sample(&self, normal: DVec3, w_in: DVec3, rng: &mut Generator) -> Option<Scattered> {
+        match self {
+            Reflectance::Lambert(rho) => {
+                let direction = to_world(normal, cosine_hemisphere(rng.uniform2()));
+                Some(Scattered { direction, factor: *rho, delta: false })
+            }
+            Reflectance::Glossy(law) => law.sample(normal, w_in, rng),
+        }
+    }
+
+    /// Density in solid angle with which `sample` draws `w_out`, choices included, delta components excluded
+    /// \[1/sr\]. Its integral is the probability of a continuation that is not a delta one.
+    pub fn pdf(&self, normal: DVec3, w_in: DVec3, w_out: DVec3) -> f64 {
+        match self {
+            Reflectance::Lambert(_) if above(normal, w_in, w_out) => w_out.dot(normal) / PI,
+            Reflectance::Lambert(_) => 0.0,
+            Reflectance::Glossy(law) => law.pdf(normal, w_in, w_out),
+        }
+    }
+
+    /// Directional albedo at the cosine of incidence, delta components included; at most one, and within 5e-4 of
+    /// the integral of the law (the error of the table).
+    pub fn albedo(&self, cosine: f64) -> Colour {
+        match self {
+            Reflectance::Lambert(rho) => *rho,
+            Reflectance::Glossy(law) => law.albedo(cosine),
+        }
+    }
+
+    /// Reflectance of the delta component at the cosine of incidence; `None` without one.
+    pub fn delta_reflectance(&self, cosine: f64) -> Option<Colour> {
+        match self {
+            Reflectance::Lambert(_) => None,
+            Reflectance::Glossy(law) => law.delta_reflectance(cosine),
+        }
+    }
+
+    /// The reflectance of a Lambert surface: f is `rho/pi` whatever the directions.
+    pub fn lambert(&self) -> Option<Colour> {
+        match self {
+            Reflectance::Lambert(rho) => Some(*rho),
+            Reflectance::Glossy(_) => None,
+        }
+    }
+
+    /// True when part of the light is reflected by a delta component, which no connection can carry.
+    pub fn has_delta(&self) -> bool {
+        match self {
+            Reflectance::Lambert(_) => false,
+            Reflectance::Glossy(law) => law.has_delta(),
+        }
+    }
+
+    /// True when nothing is reflected by the finite part: no receiver can stand here.
+    pub fn is_black(&self) -> bool {
+        match self {
+            Reflectance::Lambert(rho) => rho.is_black(),
+            Reflectance::Glossy(law) => law.is_black(),
+        }
+    }
+
+    /// The same law with every colour replaced by its luminance, for one photometric channel. Exact for grey
+    /// materials; metallic and roughness stay.
+    pub fn grey(self) -> Self {
+        match self {
+            Reflectance::Lambert(rho) => Reflectance::Lambert(Colour::grey(rho.luminance())),
+            Reflectance::Glossy(law) => Reflectance::Glossy(Box::new(law.grey())),
+        }
+    }
+}
+
+/// True when light arrives and leaves on the side of `normal`.
+fn above(normal: DVec3, w_in: DVec3, w_out: DVec3) -> bool {
+    w_in.dot(normal) < 0.0 && w_out.dot(normal) > 0.0
+}
+
+/// (1 - c)^5: how far Schlick's factor has risen from F0 towards one at the cosine `c`.
+fn fresnel_rise(c: f64) -> f64 {
+    let x = (1.0 - c).max(0.0);
+    let x2 = x * x;
+    x2 * x2 * x
+}
