@@ -6,5 +6,6 @@ pub mod job;
 pub mod math;
 pub mod photometry;
 pub mod random;
+pub mod report;
 pub mod scene;
 pub mod tally;
