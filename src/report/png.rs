@@ -18,6 +18,8 @@ pub const MAP_ORIGIN: [u32; 2] = [13, 74];
 
 /// Small maps are enlarged towards this many pixels on their long side.
 const LONG_SIDE: u32 = 400;
+/// A line of bins is drawn at least this wide \[pixels\].
+const SHORT_SIDE: u32 = 24;
 /// Maps beyond this many bins on a side show every second, third, ... of them.
 const LARGEST_SIDE: u32 = 2000;
 /// Two panels stand side by side up to this width \[pixels\], else one below the other.
@@ -100,7 +102,7 @@ impl Zoom {
         let bins = [values.shape.width, values.shape.height];
         let step = bins[0].max(bins[1]).div_ceil(LARGEST_SIDE);
         let bins = bins.map(|n| n.div_ceil(step));
-        let fit = |side: f64, n: u32| (side.round() as u32).clamp(1, (2 * LONG_SIDE / n).max(1));
+        let fit = |side: f64, n: u32| (side.round() as u32).clamp(SHORT_SIDE.div_ceil(n), (2 * LONG_SIDE / n).max(1));
         let wide = f64::from(bins[0]) >= f64::from(bins[1]) * shape;
         let unit = LONG_SIDE / if wide { bins[0] } else { bins[1] };
         let unit = f64::from(unit.max(1));
@@ -134,7 +136,8 @@ impl Panel {
         number: fn(&Bin) -> f64,
     ) -> Self {
         let finite = || values.bins.iter().map(number).filter(|x| x.is_finite());
-        let scale = Scale::fit(finite(), gradient);
+        // An error is small or large against nothing; a value may vary little around a large mean.
+        let scale = Scale::fit(finite(), gradient, unit == "%");
         let labels = scale.ticks().into_iter().map(label).collect();
         let [least, most] = [finite().fold(f64::NAN, f64::min), finite().fold(f64::NAN, f64::max)];
         let extremes = format!("{} .. {} {unit} found", short(least, 4), short(most, 4));
@@ -202,26 +205,25 @@ impl Picture {
     fn draw(&self, values: &SetValues) -> Canvas {
         let map = self.zoom.size(values);
         let sizes = [0, 1].map(|i| self.panels[i].size(map));
-        let (places, end) = place(sizes);
+        let (places, [right, bottom]) = place(sizes);
+        let top = bottom + 6;
         let texts = self.remarks.iter().chain([&self.subtitle]).map(|t| Font::Small.width(t));
         let words = texts.chain([Font::Title.width(&self.title)]).max().unwrap_or(0);
-        let width = end[0].max(MAP_ORIGIN[0] + words) + MARGIN;
-        let mut canvas = Canvas::new(width, end[1] + MARGIN + self.remarks.len() as u32 * LINE);
+        let width = right.max(MAP_ORIGIN[0] + words) + MARGIN;
+        let mut canvas = Canvas::new(width, top + MARGIN + self.remarks.len() as u32 * LINE);
         canvas.text([MAP_ORIGIN[0], MARGIN], &self.title, Font::Title);
         canvas.text([MAP_ORIGIN[0], MARGIN + 22], &self.subtitle, Font::Small);
         for (panel, at) in self.panels.iter().zip(places) {
             panel.draw(&mut canvas, at, values, &self.zoom);
         }
         for (i, remark) in (0u32..).zip(&self.remarks) {
-            canvas.text([MAP_ORIGIN[0], end[1] + i * LINE], remark, Font::Small);
+            canvas.text([MAP_ORIGIN[0], top + i * LINE], remark, Font::Small);
         }
-        if self.remarks.iter().any(|r| r.starts_with("grey")) {
-            self.mark_grey(&mut canvas, end[1]);
-        }
+        self.mark_grey(&mut canvas, top);
         canvas
     }
 
-    /// Draws a patch of the grey behind the remark that explains it.
+    /// Draws a patch of grey behind the remark that explains it, if there is one.
     fn mark_grey(&self, canvas: &mut Canvas, top: u32) {
         let Some(i) = self.remarks.iter().position(|r| r.starts_with("grey")) else { return };
         let at = [MAP_ORIGIN[0] + Font::Small.width(&self.remarks[i]) + 8, top + i as u32 * LINE + 2];

@@ -67,7 +67,8 @@ impl Bin {
 
     /// Standard error over the size of the value \[1\]; NaN where nothing is known.
     pub fn relative_error(&self) -> f64 {
-        self.standard_error / self.value.abs()
+        // An exact zero has no error, where 0/0 would have no value.
+        if self.standard_error == 0.0 { 0.0 } else { self.standard_error / self.value.abs() }
     }
 
     /// All numbers in a fixed order, for a digest.
