@@ -81,9 +81,14 @@ fn write_set(plan: &Plan, merged: &Merged, values: &SetValues, dir: &Path) -> Re
     replace(&dir.join(format!("{name}.png")), |to| png::write(plan, merged, values, to))
 }
 
-/// Batches that are missing, as readers count them: `32-64, 96-128`, half-open; empty when complete.
+/// Batches that are missing, `32-64, 96-128`, half-open; empty when complete. A long list is cut short: the whole of
+/// it is in `summary.json`.
 fn missing_text(merged: &Merged) -> String {
-    let ranges: Vec<String> = merged.missing.iter().map(|r| format!("{}-{}", r.start, r.end)).collect();
+    const MOST: usize = 8;
+    let mut ranges: Vec<String> = merged.missing.iter().take(MOST).map(|r| format!("{}-{}", r.start, r.end)).collect();
+    if merged.missing.len() > MOST {
+        ranges.push(format!("and {} more ranges", merged.missing.len() - MOST));
+    }
     ranges.join(", ")
 }
 
@@ -103,4 +108,23 @@ fn replace(path: &Path, write: impl FnOnce(&mut BufWriter<&File>) -> std::io::Re
         Ok(())
     };
     result().map_err(Error::io(path))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failed_replacement_leaves_the_old_file_and_nothing_beside_it() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("summary.json");
+        replace(&path, |to| to.write_all(b"old")).unwrap();
+        let failed = replace(&path, |to| {
+            to.write_all(b"half")?;
+            Err(std::io::Error::other("disk full"))
+        });
+        assert!(failed.unwrap_err().to_string().ends_with("summary.json: disk full"));
+        assert_eq!(std::fs::read(&path).unwrap(), b"old");
+        assert_eq!(std::fs::read_dir(&dir).unwrap().count(), 1);
+    }
 }

@@ -74,7 +74,7 @@ fn remarks(merged: &Merged, values: &SetValues, zoom: &Zoom) -> Vec<String> {
         ReceiverKind::Gonio => {
             format!("{width} x {height} directions: +Y on top, -Z in the centre, +X right of it")
         }
-        _ => format!("{width} columns along u (to the right), {height} rows along v (downwards), row 0 on top"),
+        _ => format!("{width} x {height} points: columns along u to the right, rows along v downwards, row 0 on top"),
     }];
     if zoom.step > 1 {
         remarks.push(format!("one of {} bins drawn in each direction", zoom.step));
@@ -239,4 +239,41 @@ fn place(sizes: [[u32; 2]; 2]) -> ([[u32; 2]; 2], [u32; 2]) {
     let second = if beside[0] + sizes[1][0] <= WIDEST { beside } else { [first[0], first[1] + sizes[0][1] + MARGIN] };
     let end = |i: usize| (first[i] + sizes[0][i]).max(second[i] + sizes[1][i]);
     ([first, second], [end(0), end(1)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::job::{Kept, SetShape};
+
+    /// Pixels of a cell, of the whole map, and the step between bins drawn.
+    fn zoom(width: u32, height: u32, shape: f64) -> ([u32; 2], [u32; 2], u32) {
+        let kept = Kept::Moments { colour: false };
+        let shape_of_set = SetShape { name: "x".into(), kind: ReceiverKind::Grid, width, height, kept };
+        let values = SetValues { shape: shape_of_set, bins: Vec::new() };
+        let zoom = Zoom::new(&values, shape);
+        (zoom.cell, zoom.size(&values), zoom.step)
+    }
+
+    #[test]
+    fn bins_become_rectangles_of_whole_pixels() {
+        assert_eq!(zoom(256, 256, 1.0), ([1, 1], [256, 256], 1));
+        assert_eq!(zoom(64, 32, 1.0), ([6, 6], [384, 192], 1));
+        // 6 x 4 m in 32 x 32 cells keep their shape.
+        assert_eq!(zoom(32, 32, 4.0 / 6.0), ([12, 8], [384, 256], 1));
+        assert_eq!(zoom(10, 40, 1.0), ([10, 10], [100, 400], 1));
+        // A line is drawn thick enough to be seen, a needle no longer than twice the usual side.
+        assert_eq!(zoom(61, 1, 1.0), ([6, 24], [366, 24], 1));
+        assert_eq!(zoom(1, 1, 1e9), ([24, 400], [24, 400], 1));
+        assert_eq!(zoom(1200, 300, 1.0), ([1, 1], [1200, 300], 1));
+        assert_eq!(zoom(5000, 4001, 1.0), ([1, 1], [1667, 1334], 3));
+        assert_eq!(zoom(65536, 1, 1e-6).2, 33);
+    }
+
+    #[test]
+    fn panels_stand_side_by_side_while_they_fit() {
+        let [x, y] = [MAP_ORIGIN[0], MAP_ORIGIN[1] - LINE];
+        assert_eq!(place([[400, 300], [450, 310]]).0, [[x, y], [x + 436, y]]);
+        assert_eq!(place([[1300, 300], [1310, 300]]), ([[x, y], [x, y + 312]], [x + 1310, y + 612]));
+    }
 }

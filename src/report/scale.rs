@@ -73,9 +73,11 @@ impl Scale {
         while let Some(&last) = ticks.last().filter(|&&t| t < self.high) {
             ticks.push(next_round(last * 1.5));
         }
-        // Over many decades the powers of ten and the ends are enough.
+        // Over many decades the powers of ten and the ends are enough, where their labels do not touch.
         if ticks.len() > 10 {
-            ticks.retain(|&t| t == self.low || t == self.high || t == round_number(1, exponent_below(t)));
+            let apart = |t: f64| (0.07..=0.93).contains(&self.position(t));
+            let power = |t: f64| t == round_number(1, exponent_below(t));
+            ticks.retain(|&t| t == self.low || t == self.high || (power(t) && apart(t)));
         }
         ticks
     }
