@@ -1,0 +1,74 @@
+//! Illuminance as tables: one row for each grid point or lux-meter, every number with all its digits.
+
+use super::values::{Bin, FEW_BATCHES, SetValues, Status};
+use crate::farm::merge::Merged;
+use crate::farm::plan::Plan;
+use crate::math::DVec3;
+use std::io::{Result, Write};
+
+const HEADER: [&str; 16] = [
+    "index",
+    "column",
+    "row",
+    "x_m",
+    "y_m",
+    "z_m",
+    "nx",
+    "ny",
+    "nz",
+    "direct_lx",
+    "illuminance_lx",
+    "standard_error_lx",
+    "ci_lower_lx",
+    "ci_upper_lx",
+    "vov",
+    "note",
+];
+
+/// Writes the grid `values`, row-major, column fastest.
+pub(super) fn write_grid(plan: &Plan, merged: &Merged, values: &SetValues, to: &mut impl Write) -> Result<()> {
+    let grid = plan.job.grids.iter().find(|g| g.name == values.shape.name).expect("a set comes from its job");
+    let mut table = ::csv::Writer::from_writer(to);
+    table.write_record(HEADER)?;
+    let columns = values.shape.width as usize;
+    for (index, bin) in values.bins.iter().enumerate() {
+        let place = [index, index % columns, index / columns];
+        table.write_record(row(place, grid.position(index), grid.normal, bin, &note(bin, merged)))?;
+    }
+    table.flush()
+}
+
+/// Writes all lux-meters `points`, in job order, each with its name in front.
+pub(super) fn write_points(plan: &Plan, merged: &Merged, points: &[SetValues], to: &mut impl Write) -> Result<()> {
+    let mut table = ::csv::Writer::from_writer(to);
+    table.write_record(["name"].iter().chain(&HEADER))?;
+    for (index, (values, point)) in points.iter().zip(&plan.job.points).enumerate() {
+        assert_eq!(values.shape.name, point.name, "points come in job order");
+        let bin = &values.bins[0];
+        let row = row([index, 0, 0], point.position, point.normal, bin, &note(bin, merged));
+        table.write_record([point.name.clone()].iter().chain(&row))?;
+    }
+    table.flush()
+}
+
+fn row(place: [usize; 3], position: [f64; 3], normal: [f64; 3], bin: &Bin, note: &str) -> Vec<String> {
+    let normal = DVec3::from_array(normal).normalize().to_array();
+    let light = [bin.direct, bin.value, bin.standard_error, bin.low, bin.high, bin.vov];
+    // Debug prints the shortest text that reads back to the same bits, with an exponent where one is due.
+    let numbers = position.iter().chain(&normal).chain(&light).map(|x| format!("{x:?}"));
+    place.iter().map(usize::to_string).chain(numbers).chain([note.to_owned()]).collect()
+}
+
+/// What a reader must know before using the numbers of `bin`.
+fn note(bin: &Bin, merged: &Merged) -> String {
+    if bin.status == Status::NoReceiver {
+        return "inside".to_owned();
+    }
+    let notes = [
+        (bin.status == Status::NoInformation, "no information"),
+        (merged.batches < FEW_BATCHES, "few batches"),
+        (!merged.missing.is_empty(), "incomplete"),
+    ];
+    let due: Vec<&str> = notes.iter().filter(|(holds, _)| *holds).map(|&(_, text)| text).collect();
+    due.join("; ")
+}

@@ -1,0 +1,130 @@
+//! What is shown: the files of a results folder.
+//!
+//! | file | content |
+//! |---|---|
+//! | `<camera>.exr`, `<gonio>.exr` | luminance map: `R,G,B`, `luminance.*`, `direct.Y`, see below |
+//! | `<grid>.csv` | illuminance, one row for each grid point, row-major |
+//! | `points.csv` | the same for all lux-meters `[[point]]`, with their names |
+//! | `<name>.png` | false-colour picture of a camera, goniometer or grid and of its relative error |
+//! | `summary.json` | one line of statistics for each receiver set, flux balance, timings, digest of all numbers |
+//!
+//! Channels of an EXR file, 32-bit float, row 0 on top, \[cd/m2\] except where said:
+//!
+//! | channel | content |
+//! |---|---|
+//! | `R`, `G`, `B` | linear Rec.709 whose luminance is `luminance.Y` (`whiteLuminance` = 1); grey in luminance mode |
+//! | `luminance.Y` | mean over the batches |
+//! | `luminance.variance` | of that mean: the square of the next \[cd2/m4\] |
+//! | `luminance.standardError` | of that mean |
+//! | `luminance.ciLower`, `luminance.ciUpper` | Student's interval at the confidence of the job, not clamped at 0 |
+//! | `luminance.peak` | largest single history over the sum of all \[1\], direct light left out |
+//! | `direct.Y` | the part of `luminance.Y` that is emitted or reflected once (L0 + K L0) |
+//!
+//! NaN stands wherever nothing is known: no receiver, no batch, no score. The report turns counted numbers into
+//! files; how they were produced it does not know, and it never recomputes them.
+
+mod canvas;
+mod csv;
+mod exr;
+mod number;
+mod png;
+mod scale;
+mod summary;
+mod text;
+mod values;
+
+pub use png::MAP_ORIGIN;
+pub use text::text_summary;
+
+use crate::error::{Error, Result};
+use crate::farm::merge::Merged;
+use crate::farm::plan::Plan;
+use crate::job::ReceiverKind;
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::os::unix::fs::PermissionsExt;
+use std::path::Path;
+use summary::Collector;
+use values::SetValues;
+
+/// Writes all results of `plan` into the folder `dir`; `summary.json` last, so that it stands for a whole set.
+///
+/// # Errors
+/// [`Error::Io`] naming the file that could not be written.
+pub fn write(plan: &Plan, merged: &Merged, dir: &Path) -> Result<()> {
+    std::fs::create_dir_all(dir).map_err(Error::io(dir))?;
+    let mut collector = Collector::new(plan, merged);
+    let mut points = Vec::new();
+    for values in SetValues::all(plan, merged) {
+        collector.add(&values);
+        if values.shape.kind == ReceiverKind::Point {
+            points.push(values);
+        } else {
+            write_set(plan, merged, &values, dir)?;
+        }
+    }
+    if !points.is_empty() {
+        replace(&dir.join("points.csv"), |to| csv::write_points(plan, merged, &points, to))?;
+    }
+    let summary = collector.finish();
+    replace(&dir.join("summary.json"), |to| summary::write_json(&summary, to))
+}
+
+/// The files of one receiver set that is not a point.
+fn write_set(plan: &Plan, merged: &Merged, values: &SetValues, dir: &Path) -> Result<()> {
+    let name = &values.shape.name;
+    if values.shape.kind == ReceiverKind::Grid {
+        replace(&dir.join(format!("{name}.csv")), |to| csv::write_grid(plan, merged, values, to))?;
+    } else {
+        replace(&dir.join(format!("{name}.exr")), |to| exr::write(plan, merged, values, to))?;
+    }
+    replace(&dir.join(format!("{name}.png")), |to| png::write(plan, merged, values, to))
+}
+
+/// Batches that are missing, `32-64, 96-128`, half-open; empty when complete. A long list is cut short: the whole of
+/// it is in `summary.json`.
+fn missing_text(merged: &Merged) -> String {
+    const MOST: usize = 8;
+    let mut ranges: Vec<String> = merged.missing.iter().take(MOST).map(|r| format!("{}-{}", r.start, r.end)).collect();
+    if merged.missing.len() > MOST {
+        ranges.push(format!("and {} more ranges", merged.missing.len() - MOST));
+    }
+    ranges.join(", ")
+}
+
+/// Writes the file at `path` beside it and renames it, so that a crash never leaves half a file under that name.
+fn replace(path: &Path, write: impl FnOnce(&mut BufWriter<&File>) -> std::io::Result<()>) -> Result<()> {
+    let dir = path.parent().unwrap_or(Path::new("."));
+    let result = || -> std::io::Result<()> {
+        // A temporary file is private by default; results are as readable as the user's umask lets them be.
+        let mode = std::fs::Permissions::from_mode(0o666);
+        let file = tempfile::Builder::new().prefix(".").suffix(".part").permissions(mode).tempfile_in(dir)?;
+        let mut writer = BufWriter::new(file.as_file());
+        write(&mut writer)?;
+        writer.flush()?;
+        drop(writer);
+        file.as_file().sync_all()?;
+        file.persist(path)?;
+        Ok(())
+    };
+    result().map_err(Error::io(path))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failed_replacement_leaves_the_old_file_and_nothing_beside_it() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("summary.json");
+        replace(&path, |to| to.write_all(b"old")).unwrap();
+        let failed = replace(&path, |to| {
+            to.write_all(b"half")?;
+            Err(std::io::Error::other("disk full"))
+        });
+        assert!(failed.unwrap_err().to_string().ends_with("summary.json: disk full"));
+        assert_eq!(std::fs::read(&path).unwrap(), b"old");
+        assert_eq!(std::fs::read_dir(&dir).unwrap().count(), 1);
+    }
+}

@@ -1,0 +1,265 @@
+//! `summary.json`: what a whole receiver set says in a line, the flux balance, timings, and a digest by which two
+//! runs are compared. A number that is not finite is `null`.
+
+use super::values::{Bin, FEW_BATCHES, SetValues, Status, kind_name, unit};
+use crate::farm::merge::Merged;
+use crate::farm::plan::{Input, Plan};
+use crate::tally::FLUX_BINS;
+use crate::tally::statistics::{Estimate, figure_of_merit, median, student_quantile};
+use serde::Serialize;
+use std::io::{Result, Write};
+
+/// The content of `summary.json`.
+#[derive(Debug, Serialize)]
+pub(super) struct Summary {
+    pub program: String,
+    pub numerics: u32,
+    pub name: String,
+    pub plan_digest: String,
+    pub job_file: Input,
+    pub inputs: Vec<Input>,
+    /// False when batches of the plan are missing.
+    pub complete: bool,
+    pub batches: u64,
+    /// Half-open ranges of batches.
+    pub missing_batches: Vec<[u64; 2]>,
+    pub histories_per_batch: u64,
+    pub histories: u64,
+    pub seed: u64,
+    pub confidence: f64,
+    pub sets: Vec<SetSummary>,
+    pub flux_lm: Flux,
+    pub timings: Timings,
+    /// Of the scene, and of these results.
+    pub warnings: Vec<String>,
+    /// BLAKE3 of all numbers of all bins and of the flux balance: equal for equal results, whatever the time taken.
+    pub results_digest: String,
+}
+
+/// One receiver set.
+#[derive(Debug, Serialize)]
+pub(super) struct SetSummary {
+    pub name: String,
+    pub kind: &'static str,
+    pub unit: &'static str,
+    pub bins: usize,
+    /// Bins without receiver: inside a solid or behind a surface. They are in none of the statistics.
+    pub inside: usize,
+    /// Bins whose receiver never scored.
+    pub no_information: usize,
+    /// Bins that are the same in every batch; they have no part in the statistics of errors.
+    pub exact: usize,
+    pub mean: f64,
+    pub min: f64,
+    pub max: f64,
+    pub median_relative_error: f64,
+    pub worst_relative_error: f64,
+    /// 1 / (mean squared relative error x seconds of all workers) \[1/s\].
+    pub figure_of_merit: f64,
+}
+
+/// A number with its error.
+#[derive(Debug, Serialize)]
+pub(super) struct Term {
+    pub mean: f64,
+    pub standard_error: f64,
+    pub ci_lower: f64,
+    pub ci_upper: f64,
+}
+
+/// Where the emitted flux went \[lm\].
+#[derive(Debug, Serialize)]
+pub(super) struct Flux {
+    pub emitted: Term,
+    pub absorbed: Term,
+    pub escaped: Term,
+    pub lost: Term,
+    pub met_delta: Term,
+    /// emitted - absorbed - escaped - lost, with the error of the differences batch by batch.
+    pub difference: Term,
+    /// met_delta / emitted \[1\].
+    pub met_delta_share: f64,
+    pub met_delta_meaning: String,
+}
+
+/// How long it took.
+#[derive(Debug, Serialize)]
+pub(super) struct Timings {
+    /// Time spent by all workers \[s\].
+    pub worker_seconds: f64,
+    pub histories_per_second: f64,
+}
+
+/// Gathers a [`Summary`] from one receiver set after the other.
+pub(super) struct Collector<'a> {
+    plan: &'a Plan,
+    merged: &'a Merged,
+    sets: Vec<SetSummary>,
+    hasher: blake3::Hasher,
+}
+
+impl<'a> Collector<'a> {
+    /// Nothing gathered yet.
+    pub fn new(plan: &'a Plan, merged: &'a Merged) -> Self {
+        Collector { plan, merged, sets: Vec::new(), hasher: blake3::Hasher::new() }
+    }
+
+    /// Takes in the next receiver set in job order.
+    pub fn add(&mut self, values: &SetValues) {
+        self.sets.push(SetSummary::new(values, self.merged.seconds));
+        let shape = &values.shape;
+        self.hasher.update(shape.name.as_bytes());
+        self.hasher.update(&shape.width.to_le_bytes()).update(&shape.height.to_le_bytes());
+        for bin in &values.bins {
+            self.hash(&bin.numbers());
+        }
+    }
+
+    /// The summary of all.
+    pub fn finish(mut self) -> Summary {
+        let flux = Flux::new(self.merged, self.plan.job.run.confidence);
+        for term in flux.terms() {
+            self.hash(&[term.mean, term.standard_error, term.ci_lower, term.ci_upper]);
+        }
+        let (plan, merged, run) = (self.plan, self.merged, &self.plan.job.run);
+        let histories = merged.batches * run.histories_per_batch;
+        Summary {
+            program: plan.program.clone(),
+            numerics: plan.numerics,
+            name: plan.name.clone(),
+            plan_digest: plan.digest.clone(),
+            job_file: plan.job_file.clone(),
+            inputs: plan.inputs.clone(),
+            complete: merged.missing.is_empty(),
+            batches: merged.batches,
+            missing_batches: merged.missing.iter().map(|r| [r.start, r.end]).collect(),
+            histories_per_batch: run.histories_per_batch,
+            histories,
+            seed: run.seed,
+            confidence: run.confidence,
+            warnings: warnings(plan, merged, &flux, &self.sets),
+            sets: self.sets,
+            flux_lm: flux,
+            timings: Timings {
+                worker_seconds: merged.seconds,
+                histories_per_second: histories as f64 / merged.seconds,
+            },
+            results_digest: self.hasher.finalize().to_hex().to_string(),
+        }
+    }
+
+    fn hash(&mut self, numbers: &[f64]) {
+        for x in numbers {
+            // One NaN is as good as another, but their bits differ between operations.
+            let x = if x.is_nan() { f64::NAN } else { *x };
+            self.hasher.update(&x.to_bits().to_le_bytes());
+        }
+    }
+}
+
+impl SetSummary {
+    fn new(values: &SetValues, seconds: f64) -> Self {
+        let bins = &values.bins;
+        let count = |status| bins.iter().filter(|b| b.status == status).count();
+        let found = || bins.iter().map(|b| b.value).filter(|x| x.is_finite());
+        let errors = || bins.iter().filter(|b| b.status == Status::Estimated).map(Bin::relative_error);
+        let errors = || errors().filter(|x| x.is_finite());
+        SetSummary {
+            name: values.shape.name.clone(),
+            kind: kind_name(values.shape.kind),
+            unit: unit(values.shape.kind),
+            bins: bins.len(),
+            inside: count(Status::NoReceiver),
+            no_information: count(Status::NoInformation),
+            exact: count(Status::Exact),
+            mean: mean(found()),
+            min: found().fold(f64::NAN, f64::min),
+            max: found().fold(f64::NAN, f64::max),
+            median_relative_error: median(errors()),
+            worst_relative_error: errors().fold(f64::NAN, f64::max),
+            figure_of_merit: figure_of_merit(mean(errors().map(|r| r * r)).sqrt(), seconds),
+        }
+    }
+}
+
+impl Term {
+    fn new(estimate: Estimate, quantile: f64) -> Self {
+        let (ci_lower, ci_upper) = estimate.interval(quantile);
+        Term { mean: estimate.mean, standard_error: estimate.standard_error, ci_lower, ci_upper }
+    }
+}
+
+impl Flux {
+    fn new(merged: &Merged, confidence: f64) -> Self {
+        let quantile = student_quantile(confidence, merged.batches);
+        let [emitted, absorbed, escaped, lost, met_delta] = ["emitted", "absorbed", "escaped", "lost", "met_delta"]
+            .map(|name| Term::new(merged.flux.estimate(place(name)), quantile));
+        let bins = ["emitted", "absorbed", "escaped", "lost"].map(place);
+        let balance = |batch: &[f64]| batch[bins[0]] - batch[bins[1]] - batch[bins[2]] - batch[bins[3]];
+        let difference = Estimate::from_scores(merged.flux.value.chunks_exact(FLUX_BINS.len()).map(balance));
+        let met_delta_share = met_delta.mean / emitted.mean;
+        Flux {
+            difference: Term::new(difference, quantile),
+            met_delta_meaning: met_delta_meaning(met_delta_share),
+            met_delta_share,
+            emitted,
+            absorbed,
+            escaped,
+            lost,
+            met_delta,
+        }
+    }
+
+    fn terms(&self) -> [&Term; 6] {
+        [&self.emitted, &self.absorbed, &self.escaped, &self.lost, &self.met_delta, &self.difference]
+    }
+}
+
+/// Place of the flux bin `name`.
+fn place(name: &str) -> usize {
+    FLUX_BINS.iter().position(|&n| n == name).expect("a name of FLUX_BINS")
+}
+
+fn met_delta_meaning(share: f64) -> String {
+    if share > 0.0 {
+        format!(
+            "{:.3} % of the emitted flux met a mirror: light whose last surface before a receiver is a mirror is \
+             missing from these results (emission seen in a mirror by an eye is not)",
+            100.0 * share
+        )
+    } else {
+        "no flux met a mirror: nothing is missing for that reason".to_owned()
+    }
+}
+
+fn warnings(plan: &Plan, merged: &Merged, flux: &Flux, sets: &[SetSummary]) -> Vec<String> {
+    let mut warnings = plan.scene.warnings.clone();
+    if !merged.missing.is_empty() {
+        warnings.push(format!("incomplete: batches {} are missing", super::missing_text(merged)));
+    }
+    if merged.batches < FEW_BATCHES {
+        warnings.push(format!("few batches: {} of the {FEW_BATCHES} that an interval needs", merged.batches));
+    }
+    if flux.lost.mean > 0.0 {
+        warnings.push(format!("{:e} lm were stopped by a numerical guard", flux.lost.mean));
+    }
+    if flux.met_delta_share > 0.0 {
+        warnings.push(flux.met_delta_meaning.clone());
+    }
+    for set in sets.iter().filter(|s| s.no_information > 0) {
+        warnings.push(format!("{}: {} of {} bins have no information", set.name, set.no_information, set.bins));
+    }
+    warnings
+}
+
+/// Writes `summary` as JSON.
+pub(super) fn write_json(summary: &Summary, to: &mut impl Write) -> Result<()> {
+    serde_json::to_writer_pretty(&mut *to, summary)?;
+    writeln!(to)
+}
+
+/// Mean of `values`; NaN without any.
+fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    let (n, sum) = values.fold((0.0, 0.0), |(n, sum), x| (n + 1.0, sum + x));
+    sum / n
+}
