@@ -26,6 +26,11 @@ pub struct Scattered {
 }
 
 impl Reflectance {
+    /// glTF's metallic-roughness material.
+    pub fn metallic_roughness(base: Colour, _metallic: f64, _roughness: f64) -> Reflectance {
+        Reflectance::Lambert(base)
+    }
+
     /// f(w_in -> w_out) \[1/sr\] without delta components.
     pub fn evaluate(&self, normal: DVec3, _w_in: DVec3, w_out: DVec3) -> Colour {
         match self {
