@@ -170,7 +170,7 @@ impl<'a> Buffers<'a> {
     /// Proves that elements start on a multiple of the size of a component, as glTF demands.
     fn aligned(&self, accessor: &Accessor, view: &BufferView, path: &str, component: Component) -> Result<()> {
         let size = component.size() as u64;
-        if accessor.byte_offset % size == 0 && view.byte_offset % size == 0 {
+        if accessor.byte_offset.is_multiple_of(size) && view.byte_offset.is_multiple_of(size) {
             return Ok(());
         }
         let value = format!("{} + {} of its view", accessor.byte_offset, view.byte_offset);

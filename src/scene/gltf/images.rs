@@ -84,17 +84,16 @@ impl<'a> Images<'a> {
 
 /// Mean of an encoded image, or why it cannot be had.
 fn decode(bytes: &[u8]) -> std::result::Result<Mean, String> {
-    let mut histogram = Histogram::new();
-    match bytes {
-        [0x89, b'P', b'N', b'G', ..] => png(bytes, &mut histogram)?,
-        [0xff, 0xd8, 0xff, ..] => jpeg(bytes, &mut histogram)?,
+    let histogram = match bytes {
+        [0x89, b'P', b'N', b'G', ..] => png(bytes)?,
+        [0xff, 0xd8, 0xff, ..] => jpeg(bytes)?,
         _ => return Err("it is in another format".to_owned()),
-    }
+    };
     Ok(histogram.mean())
 }
 
 /// Counts the pixels of a PNG row by row, so that memory does not grow with the size it claims.
-fn png(bytes: &[u8], histogram: &mut Histogram) -> std::result::Result<(), String> {
+fn png(bytes: &[u8]) -> std::result::Result<Histogram, String> {
     let mut decoder = png::Decoder::new(Cursor::new(bytes));
     decoder.set_transformations(png::Transformations::EXPAND);
     let mut reader = decoder.read_info().map_err(|error| error.to_string())?;
@@ -102,24 +101,25 @@ fn png(bytes: &[u8], histogram: &mut Histogram) -> std::result::Result<(), Strin
     check_size(width.into(), height.into())?;
     let (colour, depth) = reader.output_color_type();
     let grey = matches!(colour, png::ColorType::Grayscale | png::ColorType::GrayscaleAlpha);
-    let sample = if depth == png::BitDepth::Sixteen { 2 } else { 1 };
+    // EXPAND leaves no other depths.
+    let (sample, levels) = if depth == png::BitDepth::Sixteen { (2, 1 << 16) } else { (1, 1 << 8) };
+    let mut histogram = Histogram::new(levels);
     let mut counted = 0;
     while let Some(row) = reader.next_row().map_err(|error| error.to_string())? {
         for pixel in row.data().chunks_exact(colour.samples() * sample) {
             histogram.count([0, 1, 2].map(|channel| {
                 let at = if grey { 0 } else { channel * sample };
-                // An eight-bit value v is v x 257 in sixteen bits: the same fraction of full scale.
-                u16::from_be_bytes([pixel[at], pixel[at + sample - 1]])
+                pixel[at..at + sample].iter().fold(0, |value, &byte| value << 8 | usize::from(byte))
             }));
             counted += 1;
         }
     }
     // An interlaced image passes every pixel once, in another order.
-    (counted == u64::from(width) * u64::from(height)).then_some(()).ok_or_else(|| "it is incomplete".to_owned())
+    (counted == u64::from(width) * u64::from(height)).then_some(histogram).ok_or_else(|| "it is incomplete".to_owned())
 }
 
 /// Counts the pixels of a JPEG.
-fn jpeg(bytes: &[u8], histogram: &mut Histogram) -> std::result::Result<(), String> {
+fn jpeg(bytes: &[u8]) -> std::result::Result<Histogram, String> {
     // Strict: otherwise a truncated image ends in grey without a word.
     let options = DecoderOptions::new_safe().set_strict_mode(true).jpeg_set_out_colorspace(ColorSpace::RGB);
     let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
@@ -127,10 +127,11 @@ fn jpeg(bytes: &[u8], histogram: &mut Histogram) -> std::result::Result<(), Stri
     let size = decoder.info().ok_or("it has no header")?;
     check_size(size.width.into(), size.height.into())?;
     let pixels = decoder.decode().map_err(|error| error.to_string())?;
+    let mut histogram = Histogram::new(1 << 8);
     for pixel in pixels.chunks_exact(3) {
-        histogram.count([pixel[0], pixel[1], pixel[2]].map(|value| u16::from(value) * 257));
+        histogram.count([pixel[0], pixel[1], pixel[2]].map(usize::from));
     }
-    Ok(())
+    Ok(histogram)
 }
 
 /// Refuses images without pixels and those beyond [`MAX_PIXELS`].
@@ -141,20 +142,21 @@ fn check_size(width: u64, height: u64) -> std::result::Result<(), String> {
     }
 }
 
-/// How often each sixteen-bit value occurs in each channel.
+/// How often each value occurs in each channel.
 struct Histogram {
     counts: [Vec<u64>; 3],
 }
 
 impl Histogram {
-    fn new() -> Self {
-        Histogram { counts: std::array::from_fn(|_| vec![0; 1 << 16]) }
+    /// Of an image whose values are below `levels`.
+    fn new(levels: usize) -> Self {
+        Histogram { counts: std::array::from_fn(|_| vec![0; levels]) }
     }
 
     /// Counts one pixel.
-    fn count(&mut self, pixel: [u16; 3]) {
+    fn count(&mut self, pixel: [usize; 3]) {
         for (counts, value) in self.counts.iter_mut().zip(pixel) {
-            counts[usize::from(value)] += 1;
+            counts[value] += 1;
         }
     }
 

@@ -10,7 +10,7 @@ use super::materials::Materials;
 use super::nodes::{Placed, to_world};
 use super::problem::{File, Warnings};
 use crate::error::Result;
-use crate::math::{DMat4, DVec3};
+use crate::math::DVec3;
 use crate::scene::Model;
 
 /// Most vertices and most triangles of a scene: many nodes may show one mesh, so a small file may describe any number.
@@ -27,6 +27,12 @@ pub struct Baker<'a> {
     surface_of: Vec<u32>,
     /// Triangles without area, which were dropped.
     dropped: usize,
+    /// How many nodes show each mesh; 0 once room is claimed for all of them.
+    unclaimed: Vec<usize>,
+    /// Vertices of the meshes met so far, counting every node that will show them.
+    vertices_claimed: usize,
+    /// Their triangles, with those to be dropped: they cost time too.
+    triangles_claimed: usize,
 }
 
 /// How the vertices of a primitive make triangles.
@@ -38,8 +44,19 @@ enum Mode {
 }
 
 impl<'a> Baker<'a> {
-    /// An empty scene.
-    pub fn new(file: File<'a>, document: &'a Document, buffers: &'a Buffers<'a>, materials: Materials<'a>) -> Self {
+    /// Nothing yet of the meshes that `nodes` show.
+    pub fn new(
+        file: File<'a>,
+        document: &'a Document,
+        buffers: &'a Buffers<'a>,
+        materials: Materials<'a>,
+        nodes: &[Placed],
+    ) -> Self {
+        let mut unclaimed = vec![0; document.meshes.len()];
+        for mesh in nodes.iter().filter_map(|placed| placed.node.mesh) {
+            // A mesh that does not exist is refused when its node is reached.
+            unclaimed.get_mut(mesh).into_iter().for_each(|count| *count += 1);
+        }
         Baker {
             file,
             document,
@@ -49,6 +66,9 @@ impl<'a> Baker<'a> {
             triangles: Vec::new(),
             surface_of: Vec::new(),
             dropped: 0,
+            unclaimed,
+            vertices_claimed: 0,
+            triangles_claimed: 0,
         }
     }
 
@@ -57,14 +77,16 @@ impl<'a> Baker<'a> {
         let field = format_args!("nodes[{}].mesh", placed.index);
         let mesh = self.file.item(&self.document.meshes, "meshes", index, field)?;
         let label = mesh.name.as_ref().map_or_else(|| format!("meshes[{index}]"), |name| format!("mesh `{name}`"));
+        // The first node to show a mesh claims room for all of them, so that too much is refused at once.
+        let times = std::mem::take(&mut self.unclaimed[index]);
         let mut first_of = HashMap::new();
         for (p, primitive) in mesh.primitives.iter().enumerate() {
             let path = format!("meshes[{index}].primitives[{p}]");
             let Some(mode) = self.mode(primitive, &path, &label, warnings)? else { continue };
             note_ignored(primitive, &label, warnings);
             let surface = self.materials.surface(primitive.material, &format!("{path}.material"), &label, warnings)?;
-            let vertices = self.vertices(primitive, &path, &placed.world, &mut first_of)?;
-            let corners = self.corners(primitive, &path, mode, vertices.1)?;
+            let vertices = self.vertices(primitive, &path, placed, times, &mut first_of)?;
+            let corners = self.corners(primitive, &path, mode, vertices.1, times)?;
             let mirrored = placed.world.determinant() < 0.0;
             self.push(corners, vertices.0, mirrored, surface);
         }
@@ -103,7 +125,8 @@ impl<'a> Baker<'a> {
         &mut self,
         primitive: &Primitive,
         path: &str,
-        world: &DMat4,
+        placed: &Placed,
+        times: usize,
         first_of: &mut HashMap<usize, (u32, usize)>,
     ) -> Result<(u32, usize)> {
         let field = format!("{path}.attributes.POSITION");
@@ -114,37 +137,45 @@ impl<'a> Baker<'a> {
             return Ok(known);
         }
         let local = self.buffers.positions(accessor, &field)?;
-        self.check_room("vertices", self.positions.len(), local.len(), path)?;
+        self.vertices_claimed = self.claim("vertices", self.vertices_claimed, local.len(), times, path)?;
         let first = self.positions.len() as u32;
         for (i, &position) in local.iter().enumerate() {
-            let placed = to_world(world, position).ok_or_else(|| {
+            let position = to_world(&placed.world, position).ok_or_else(|| {
                 let field = format!("accessors[{accessor}], element {i}");
                 self.file.bad(field, position, "a world position within 1e12 m of the origin")
             })?;
-            self.positions.push(placed);
+            self.positions.push(position);
         }
         first_of.insert(accessor, (first, local.len()));
         Ok((first, local.len()))
     }
 
-    /// Refuses `more` vertices or triangles on top of `now` beyond [`MOST`].
-    fn check_room(&self, what: &str, now: usize, more: usize, path: &str) -> Result<()> {
-        if more <= MOST.saturating_sub(now) {
-            return Ok(());
+    /// `now` and `more` vertices or triangles `times` over, refused beyond [`MOST`].
+    fn claim(&self, what: &str, now: usize, more: usize, times: usize, path: &str) -> Result<usize> {
+        match more.checked_mul(times).and_then(|all| all.checked_add(now)) {
+            Some(total) if total <= MOST => Ok(total),
+            _ => {
+                let value = format!("{more} {what}, shown by {times} nodes, beside {now}");
+                Err(self.file.bad(path, value, format!("at most {MOST} {what} in the scene")))
+            }
         }
-        let value = format!("{more} {what} more than {now}");
-        Err(self.file.bad(path, value, format!("at most {MOST} {what}, counting every node that shows a mesh")))
     }
 
     /// Corners of each triangle of `primitive`, numbered within its own `count` vertices.
-    fn corners(&self, primitive: &Primitive, path: &str, mode: Mode, count: usize) -> Result<Vec<[u32; 3]>> {
+    fn corners(
+        &mut self,
+        primitive: &Primitive,
+        path: &str,
+        mode: Mode,
+        count: usize,
+        times: usize,
+    ) -> Result<Vec<[u32; 3]>> {
         let order = match primitive.indices {
             Some(accessor) => self.buffers.indices(accessor, &format!("{path}.indices"), count)?,
             None => (0..count as u32).collect(),
         };
-        // Those dropped count too: they cost time.
         let triangles = order.len() / if matches!(mode, Mode::List) { 3 } else { 1 };
-        self.check_room("triangles", self.triangles.len() + self.dropped, triangles, path)?;
+        self.triangles_claimed = self.claim("triangles", self.triangles_claimed, triangles, times, path)?;
         if order.len() < 3 || (matches!(mode, Mode::List) && order.len() % 3 != 0) {
             let allowed = if matches!(mode, Mode::List) { "a multiple of 3 vertices" } else { "3 vertices or more" };
             return Err(self.file.bad(path, order.len(), allowed));

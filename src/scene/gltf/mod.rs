@@ -59,10 +59,11 @@ pub fn load(name: &str, bytes: &[u8], fetch: &mut dyn FnMut(&str) -> Result<Vec<
     let buffers = Buffers::load(file, &document, binary.as_deref(), &mut *fetch)?;
     let images = Images::new(file, &document, &buffers, fetch);
     let materials = Materials::new(file, &document, images);
-    let mut baker = Baker::new(file, &document, &buffers, materials);
+    let nodes = nodes::walk(file, &document)?;
+    let mut baker = Baker::new(file, &document, &buffers, materials, &nodes);
     let mut model = Model::default();
-    for placed in nodes::walk(file, &document)? {
-        place(file, &document, &placed, &mut baker, &mut model, &mut warnings)?;
+    for placed in &nodes {
+        place(file, &document, placed, &mut baker, &mut model, &mut warnings)?;
     }
     baker.finish(&mut model, &mut warnings);
     model.warnings = warnings.into_list();
