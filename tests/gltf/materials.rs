@@ -1,0 +1,181 @@
+//! Factors, emission, textures by their mean.
+
+use serde_json::{Value, json};
+
+use crate::{Builder, CORNERS, SQUARE, good, warns};
+use lampyris::math::pow;
+use lampyris::photometry::Colour;
+use lampyris::scene::Model;
+
+/// A square of `material`.
+fn square(material: Value) -> Builder {
+    let mut builder = Builder::new();
+    let mesh = builder.mesh(&SQUARE, Some(&CORNERS));
+    builder.push("/materials", material);
+    builder.json["meshes"][mesh]["primitives"][0]["material"] = json!(0);
+    builder.node(json!({ "mesh": mesh }));
+    builder
+}
+
+/// A material without gloss whose base colour is texture 0.
+fn textured() -> Value {
+    let factors =
+        json!({ "metallicFactor": 0.0, "baseColorTexture": { "index": 0 }, "baseColorFactor": [0.5, 1.0, 1.0, 1.0] });
+    json!({ "name": "wall", "pbrMetallicRoughness": factors })
+}
+
+/// `builder` with its texture 0 made of the encoded image `bytes`.
+fn with_image(mut builder: Builder, bytes: &[u8]) -> Builder {
+    let view = builder.view(bytes);
+    builder.push("/images", json!({ "name": "photo", "bufferView": view }));
+    builder.push("/textures", json!({ "source": 0 }));
+    builder
+}
+
+/// A PNG of `width` pixels in one row.
+fn png(width: u32, colour: png::ColorType, depth: png::BitDepth, row: &[u8]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, width, 1);
+    encoder.set_color(colour);
+    encoder.set_depth(depth);
+    encoder.write_header().and_then(|mut writer| writer.write_image_data(row)).expect("a vector takes all");
+    bytes
+}
+
+/// Linear value of an 8-bit sRGB value.
+fn linear(value: u8) -> f64 {
+    let s = f64::from(value) / 255.0;
+    if s <= 0.04045 { s / 12.92 } else { pow((s + 0.055) / 1.055, 2.4) }
+}
+
+/// Reflectance of the first surface, which is Lambert.
+fn rho(model: &Model) -> Colour {
+    model.surfaces[0].reflectance.lambert().expect("a matt surface")
+}
+
+/// Asserts that `found` is `wanted` within rounding.
+fn assert_close(found: Colour, wanted: [f64; 3]) {
+    for (f, w) in found.0.iter().zip(wanted) {
+        assert!((f - w).abs() < 1e-12, "{found:?} is not {wanted:?}");
+    }
+}
+
+#[test]
+fn a_matt_material_is_lambert_with_its_base_colour() {
+    let factors = json!({ "baseColorFactor": [0.1, 0.2, 0.3, 1.0], "metallicFactor": 0.0, "roughnessFactor": 1.0 });
+    let model = good(&square(json!({ "name": "paint", "doubleSided": true, "pbrMetallicRoughness": factors })));
+    let surface = &model.surfaces[0];
+    assert_eq!((surface.name.as_str(), surface.double_sided, surface.emission), ("paint", true, Colour::BLACK));
+    assert_eq!(rho(&model), Colour([0.1, 0.2, 0.3]));
+    assert!(model.warnings.is_empty());
+}
+
+#[test]
+fn emission_is_factor_times_strength() {
+    let strength = json!({ "KHR_materials_emissive_strength": { "emissiveStrength": 5000.0 } });
+    let model = good(&square(json!({ "emissiveFactor": [1.0, 0.5, 0.25], "extensions": strength })));
+    assert_eq!(model.surfaces[0].emission, Colour([5000.0, 2500.0, 1250.0]));
+    assert!(!model.surfaces[0].double_sided);
+    let plain = good(&square(json!({ "emissiveFactor": [1.0, 1.0, 1.0] })));
+    assert_eq!(plain.surfaces[0].emission, Colour::WHITE);
+}
+
+#[test]
+fn a_mesh_without_material_is_white_metal_with_a_warning() {
+    let mut builder = square(json!({}));
+    builder.remove("/meshes/0/primitives/0", "material");
+    let model = good(&builder);
+    assert!(warns(&model, "meshes[0] has no material: glTF's default is used"));
+    assert_eq!(model.surfaces.len(), 1);
+}
+
+#[test]
+fn alpha_normal_and_occlusion_are_ignored_with_warnings() {
+    let texture = json!({ "index": 9 });
+    let material =
+        json!({ "name": "leaf", "alphaMode": "BLEND", "normalTexture": texture, "occlusionTexture": texture });
+    let model = good(&square(material));
+    for text in ["alphaMode BLEND", "normalTexture is ignored", "occlusionTexture is ignored"] {
+        assert!(warns(&model, text), "{text}");
+    }
+}
+
+#[test]
+fn a_colour_texture_counts_by_the_mean_of_its_linear_values() {
+    let image = png(2, png::ColorType::Rgb, png::BitDepth::Eight, &[255, 128, 0, 0, 64, 200]);
+    let model = good(&with_image(square(textured()), &image));
+    let mean = |a, b| (linear(a) + linear(b)) / 2.0;
+    assert_close(rho(&model), [0.5 * mean(255, 0), mean(128, 64), mean(0, 200)]);
+    assert!(warns(&model, "material `wall`: baseColorTexture `photo` is replaced by its mean"));
+}
+
+#[test]
+fn grey_alpha_sixteen_bit_and_palette_pngs_are_read() {
+    let expected = linear(0x80);
+    for image in [
+        png(2, png::ColorType::Grayscale, png::BitDepth::Eight, &[0x80, 0x80]),
+        png(1, png::ColorType::GrayscaleAlpha, png::BitDepth::Eight, &[0x80, 3]),
+        png(1, png::ColorType::Rgba, png::BitDepth::Eight, &[0x80, 0x80, 0x80, 0]),
+        png(1, png::ColorType::Rgb, png::BitDepth::Sixteen, &[0x80; 6]),
+    ] {
+        let model = good(&with_image(square(textured()), &image));
+        assert_close(rho(&model), [0.5 * expected, expected, expected]);
+    }
+    let mut palette = Vec::new();
+    let mut encoder = png::Encoder::new(&mut palette, 4, 1);
+    encoder.set_color(png::ColorType::Indexed);
+    encoder.set_depth(png::BitDepth::Two);
+    encoder.set_palette(vec![255, 255, 255, 0x80, 0x80, 0x80]);
+    encoder.write_header().and_then(|mut writer| writer.write_image_data(&[0b0101_0101])).expect("a vector takes all");
+    assert_close(rho(&good(&with_image(square(textured()), &palette))), [0.5 * expected, expected, expected]);
+}
+
+#[test]
+fn a_jpeg_texture_is_read() {
+    let mut image = Vec::new();
+    let encoder = jpeg_encoder::Encoder::new(&mut image, 100);
+    let pixels = [200u8, 100, 50].repeat(256);
+    encoder.encode(&pixels, 16, 16, jpeg_encoder::ColorType::Rgb).expect("a vector takes all");
+    let model = good(&with_image(square(textured()), &image));
+    let Colour([r, g, b]) = rho(&model);
+    for (found, value) in [(2.0 * r, 200), (g, 100), (b, 50)] {
+        // The colour transform of JPEG rounds to whole steps.
+        assert!(found >= linear(value - 2) && found <= linear(value + 2), "{found} for {value}");
+    }
+}
+
+#[test]
+fn emissive_texture_is_a_colour_and_one_image_serves_twice() {
+    let mut material = textured();
+    material["emissiveTexture"] = json!({ "index": 0 });
+    material["emissiveFactor"] = json!([1.0, 1.0, 1.0]);
+    let image = png(1, png::ColorType::Rgb, png::BitDepth::Eight, &[10, 100, 250]);
+    let model = good(&with_image(square(material), &image));
+    assert_close(model.surfaces[0].emission, [linear(10), linear(100), linear(250)]);
+    assert!(warns(&model, "emissiveTexture `photo`"));
+}
+
+#[test]
+fn an_image_beside_the_scene_is_fetched_once() {
+    let mut builder = square(textured());
+    builder.push("/images", json!({ "uri": "wood.png" }));
+    builder.push("/textures", json!({ "source": 0 }));
+    builder.push("/materials", textured());
+    let primitive = builder.json["meshes"][0]["primitives"][0].clone();
+    builder.push("/meshes/0/primitives", primitive);
+    builder.set("/meshes/0/primitives/1/material", json!(1));
+    let image = png(1, png::ColorType::Rgb, png::BitDepth::Eight, &[0, 0, 0]);
+    let mut asked = Vec::new();
+    let model = lampyris::scene::gltf::load("scene.glb", &builder.glb(), &mut |uri| {
+        asked.push(uri.to_owned());
+        Ok(image.clone())
+    });
+    assert_eq!((asked, model.unwrap().surfaces.len()), (vec!["wood.png".to_owned()], 2));
+}
+
+#[test]
+fn a_material_that_nothing_shows_cannot_fail() {
+    let mut builder = square(json!({}));
+    builder.push("/materials", textured());
+    assert_eq!(good(&builder).surfaces.len(), 1);
+}
