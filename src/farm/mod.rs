@@ -22,3 +22,6 @@ pub mod plan;
 pub mod realization;
 pub mod status;
 pub mod worker;
+
+#[cfg(test)]
+mod testing;

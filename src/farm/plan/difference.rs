@@ -62,14 +62,16 @@ fn compare(path: &str, old: &Value, new: &Value, lines: &mut Vec<String>) {
                 );
             }
         }
-        // Vectors of numbers read better whole.
-        (Value::Array(a), Value::Array(b)) if !a.iter().chain(b).all(Value::is_number) => {
-            compare_lists(path, a, b, lines);
-        }
-        (Value::Null, Value::Array(b)) => compare_lists(path, &[], b, lines),
-        (Value::Array(a), Value::Null) => compare_lists(path, a, &[], lines),
+        (Value::Array(a), Value::Array(b)) if is_list(old) && is_list(new) => compare_lists(path, a, b, lines),
+        (Value::Null, Value::Array(b)) if is_list(new) => compare_lists(path, &[], b, lines),
+        (Value::Array(a), Value::Null) if is_list(old) => compare_lists(path, a, &[], lines),
         _ => lines.push(line(path, shown(old), shown(new))),
     }
+}
+
+/// True for a list of entries; vectors of numbers read better whole.
+fn is_list(value: &Value) -> bool {
+    value.as_array().is_some_and(|a| !a.iter().all(Value::is_number))
 }
 
 fn compare_lists(path: &str, old: &[Value], new: &[Value], lines: &mut Vec<String>) {

@@ -282,3 +282,6 @@ fn missing(batches: u64, done: &[Range<u64>]) -> Vec<Range<u64>> {
     }
     gaps
 }
+
+#[cfg(test)]
+mod tests;
