@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::farm::folder::Folder;
 use crate::farm::plan::Plan;
 use crate::farm::testing::{JOB, fixed_direct, plan, plan_of, save, save_tally, tally};
-use crate::tally::Tally;
+use crate::tally::{BatchScores, Scores, Tally};
 use std::fs;
 use std::path::Path;
 
@@ -185,4 +185,43 @@ fn never_replaced_by_fewer_batches_nor_by_others() {
     fs::write(&path, "precious").unwrap();
     refusal(save(&folder, &plan, 1, 4));
     assert_eq!(fs::read(&path).unwrap(), b"precious");
+}
+
+/// The tally of the golden file: simple fractions, so that it depends on no generator.
+fn golden_tally(plan: &Plan) -> Tally {
+    let mut tally = Tally::new(&plan.sets());
+    for batch in 0..3 {
+        let fraction = |i: usize, k: usize| ((7 * i + 13 * batch + k) % 32) as f64 / 32.0;
+        let fill = |shape: &SetShape| {
+            let mut s = Scores::zero(shape);
+            for i in 0..shape.bins() {
+                (s.value[i], s.direct[i], s.peak[i]) = (fraction(i, 1), fraction(i, 2), fraction(i, 3));
+                s.existed[i] = (i + batch) % 3 > 0;
+            }
+            s.colour.iter_mut().enumerate().for_each(|(i, c)| *c = [fraction(i, 4), fraction(i, 5), fraction(i, 6)]);
+            s
+        };
+        let sets = plan.sets().iter().map(fill).collect();
+        tally.accumulate(&BatchScores { sets, flux: [1.0, 0.5, 0.25, 0.0, fraction(0, 7)] });
+    }
+    tally
+}
+
+#[test]
+fn the_golden_file_of_version_1_is_read_and_written_bit_for_bit() {
+    let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/shard-v1.ckpt");
+    // The numbers of the program may change without changing the format.
+    let plan = Plan { numerics: 1, ..small() };
+    let (_temp, folder) = folder();
+    let expected = golden_tally(&plan);
+    save_tally(&folder, &plan, 1, &expected, &fixed_direct(&plan)).unwrap();
+    let written = fs::read(folder.shard_path(1)).unwrap();
+    let stored = fs::read(&golden).unwrap_or_default();
+    if written != stored {
+        let new = std::env::temp_dir().join("shard-v1.ckpt");
+        fs::write(&new, &written).unwrap();
+        panic!("the bytes have changed: raise VERSION if that is meant; the new file is {}", new.display());
+    }
+    let (read, fixed) = read_all(&golden, &plan).unwrap();
+    assert_eq!((read, fixed), (expected, fixed_direct(&plan)));
 }
