@@ -1,9 +1,11 @@
 //! The folder of one plan: what lies where, and how a plan gets in and out.
 //!
-//!     DIR/plan.toml                  the plan, readable
-//!     DIR/inputs/<digest>.<ext>      the job file and every input file, by content
-//!     DIR/shards/shard-000012.ckpt   one checkpoint for each shard
-//!     DIR/...                        results
+//! ```text
+//! DIR/plan.toml                  the plan, readable
+//! DIR/inputs/<digest>.<ext>      the job file and every input file, by content
+//! DIR/shards/shard-000012.ckpt   one checkpoint for each shard
+//! DIR/...                        results
+//! ```
 //!
 //! `work DIR` needs nothing else, so the folder can be copied to another machine.
 

@@ -1,16 +1,18 @@
 //! Who does the work. Each module knows the ones above it only; `worker`, `coordinator` and `merge` do not know each
 //! other: they meet in checkpoint files.
 //!
-//!     plan          job -> shards, pure arithmetic
-//!     durable       replace a file so that a crash leaves the old or the new one
-//!     folder        what lies where in the folder of a plan
-//!     inputs        files -> plan, scene
-//!     realization   batch index -> scores: the only parallel computation
-//!     checkpoint    one durable file for each shard
-//!     status        headers -> progress
-//!     worker        computes one shard
-//!     coordinator   starts, watches, restarts worker processes
-//!     merge         checkpoints -> one result
+//! ```text
+//! plan          job -> shards, pure arithmetic
+//! durable       replace a file so that a crash leaves the old or the new one
+//! folder        what lies where in the folder of a plan
+//! inputs        files -> plan, scene
+//! realization   batch index -> scores: the only parallel computation
+//! checkpoint    one durable file for each shard
+//! status        headers -> progress
+//! worker        computes one shard
+//! coordinator   starts, watches, restarts worker processes
+//! merge         checkpoints -> one result
+//! ```
 
 pub mod checkpoint;
 pub mod coordinator;

@@ -1,6 +1,8 @@
 //! One durable file for each shard: a prefix of its batches. The format is described in docs/checkpoint-format.md.
 //!
-//!     magic (8) | version u32 | header length u32 | header (postcard) | checksum (16) | sections
+//! ```text
+//! magic (8) | version u32 | header length u32 | header (postcard) | checksum (16) | sections
+//! ```
 //!
 //! Integers are little-endian. The header names every section with offset, length and checksum, so status reads
 //! headers alone and merging streams blocks of [`BLOCK`] bins. No generator state is kept: every draw is a function
