@@ -33,6 +33,16 @@ pub enum Error {
         /// What the system said.
         source: std::io::Error,
     },
+    /// A worker process ended without finishing its shard.
+    #[error("shard {shard}: {message}")]
+    Worker {
+        /// Number of the shard.
+        shard: u64,
+        /// What it said last.
+        message: String,
+        /// Exit code that this stands for: 2 when it refused its input, else 1.
+        code: u8,
+    },
     /// The work itself failed.
     #[error("{0}")]
     Failed(String),
@@ -66,6 +76,7 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Error::Input { .. } | Error::Refused { .. } => 2,
+            Error::Worker { code, .. } => *code,
             Error::Io { .. } | Error::Failed(_) => 1,
         }
     }

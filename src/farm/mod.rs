@@ -1,7 +1,33 @@
-//! Who does the work: plan <- realization <- worker; plan <- checkpoint <- worker, coordinator, merge.
+//! Who does the work. Each module knows the ones above it only; `worker`, `coordinator` and `merge` do not know each
+//! other: they meet in checkpoint files.
+//!
+//! ```text
+//! plan          job -> shards, pure arithmetic
+//! durable       replace a file so that a crash leaves the old or the new one
+//! folder        what lies where in the folder of a plan
+//! inputs        files -> plan, scene
+//! ordering      which bins share tiles
+//! receivers     bins of a job -> receivers in a scene
+//! realization   batch index -> scores: the only parallel computation
+//! checkpoint    one durable file for each shard
+//! status        headers -> progress
+//! worker        computes one shard
+//! coordinator   starts, watches, restarts worker processes
+//! merge         checkpoints -> one result
+//! ```
 
+pub mod checkpoint;
+pub mod coordinator;
+pub mod durable;
+pub mod folder;
+pub mod inputs;
 pub mod merge;
 mod ordering;
 pub mod plan;
 pub mod realization;
-pub mod receivers;
+mod receivers;
+pub mod status;
+pub mod worker;
+
+#[cfg(test)]
+mod testing;

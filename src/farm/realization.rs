@@ -5,7 +5,6 @@
 //! Each receiver set keeps the order in which its bins share tiles, found once from the centres of its bins.
 
 use super::receivers::{ReceiverSet, TileScores};
-use crate::error::Result;
 use crate::job::{Channels, Job};
 use crate::random::{Domain, Stream};
 use crate::scene::Scene;
@@ -30,14 +29,11 @@ pub struct Realization<'a> {
 
 impl<'a> Realization<'a> {
     /// Prepares the receivers of `job` in `scene`, in the current rayon pool.
-    ///
-    /// # Errors
-    /// A receiver that cannot be placed, such as a camera node that the scene has not.
-    pub fn new(job: &'a Job, scene: &'a Scene) -> Result<Self> {
-        let sets = ReceiverSet::all(job, scene)?;
+    pub fn new(job: &'a Job, scene: &'a Scene) -> Self {
+        let sets = ReceiverSet::all(job, scene);
         let fixed_direct = sets.iter().map(|s| s.fixed_direct(scene)).collect();
         let trajectories = Stream::new(job.run.seed, Domain::Trajectory, "");
-        Ok(Realization { job, scene, sets, fixed_direct, trajectories, orders: 1..u32::MAX })
+        Realization { job, scene, sets, fixed_direct, trajectories, orders: 1..u32::MAX }
     }
 
     /// The same realization with only the vertices x_n, n in `orders`, connected: for tests order by order.

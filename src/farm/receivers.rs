@@ -30,8 +30,8 @@ pub struct ReceiverSet {
 
 /// What the bins are.
 enum Bins {
-    /// Film of an eye with `strata` x `strata` positions in a bin; no eye: nothing to see anywhere.
-    Film { eye: Option<Eye>, strata: u32 },
+    /// Film of an eye with `strata` x `strata` positions in a bin.
+    Film { eye: Eye, strata: u32 },
     /// Lux-meters; `None` inside a solid.
     Meters(Vec<Option<Receiver>>),
 }
@@ -54,18 +54,16 @@ struct BinScore {
 }
 
 impl ReceiverSet {
-    /// All receiver sets of `job` in the order of [`Job::sets`].
-    ///
-    /// # Errors
-    /// [`Error::Input`] for a camera node that the scene has not.
-    pub fn all(job: &Job, scene: &Scene) -> Result<Vec<ReceiverSet>> {
+    /// All receiver sets of `job` in the order of [`Job::sets`]; the job has passed [`ReceiverSet::check`].
+    pub fn all(job: &Job, scene: &Scene) -> Vec<ReceiverSet> {
         let mut bins = Vec::new();
         for camera in &job.cameras {
-            let eye = Some(camera_eye(scene, camera)?);
+            let eye = camera_eye(scene, camera);
             bins.push(Bins::Film { eye, strata: camera.pixel_samples.isqrt() });
         }
         for gonio in &job.gonios {
-            bins.push(Bins::Film { eye: Eye::from_gonio(scene, gonio), strata: gonio.pixel_samples.isqrt() });
+            let eye = Eye::from_gonio(scene, gonio).expect("the surface was found when the job was planned");
+            bins.push(Bins::Film { eye, strata: gonio.pixel_samples.isqrt() });
         }
         for grid in &job.grids {
             let normal = grid.normal;
@@ -75,7 +73,7 @@ impl ReceiverSet {
         for point in &job.points {
             bins.push(Bins::Meters(vec![meter(scene, point.position, point.normal)]));
         }
-        Ok(job.sets().into_iter().zip(bins).map(|(shape, bins)| ReceiverSet::new(job, scene, shape, bins)).collect())
+        job.sets().into_iter().zip(bins).map(|(shape, bins)| ReceiverSet::new(job, scene, shape, bins)).collect()
     }
 
     fn new(job: &Job, scene: &Scene, shape: SetShape, bins: Bins) -> Self {
@@ -101,24 +99,46 @@ impl ReceiverSet {
     fn center(&self, scene: &Scene, i: usize) -> DVec3 {
         match &self.bins {
             Bins::Meters(meters) => meters[i].map_or(DVec3::INFINITY, |r| r.position),
-            Bins::Film { eye, .. } => match eye.as_ref().map(|e| e.gaze(self.film(i, 1, 0, DVec2::splat(0.5)))) {
-                Some(Gaze::Along(ray)) => scene.geometry.closest_hit(&ray).map_or(DVec3::INFINITY, |h| h.position),
-                Some(Gaze::At(hit, _)) => hit.position,
-                _ => DVec3::INFINITY,
+            Bins::Film { eye, .. } => match eye.gaze(self.film(i, 1, 0, DVec2::splat(0.5))) {
+                Gaze::Along(ray) => scene.geometry.closest_hit(&ray).map_or(DVec3::INFINITY, |h| h.position),
+                Gaze::At(hit, _) => hit.position,
+                Gaze::Nowhere => DVec3::INFINITY,
             },
         }
     }
 
-    /// What the job and the scene say differently about these receivers.
-    pub fn warnings(job: &Job, scene: &Scene) -> Vec<String> {
-        let differs = |camera: &Camera| {
-            let node = scene.cameras.iter().find(|c| Some(&c.name) == camera.node.as_ref())?;
-            let (asked, given) = (f64::from(camera.width) / f64::from(camera.height), node.aspect?);
-            ((asked / given - 1.0).abs() > 1e-3).then(|| {
-                format!("camera {}: aspectRatio {given} of the scene ignored, {asked} of the job used", camera.name)
-            })
-        };
-        job.cameras.iter().filter_map(differs).collect()
+    /// Refuses receivers of `job`, read from `file`, that cannot be placed in `scene`; says what the two say
+    /// differently.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a camera node that the scene has not, or a surface point without a surface.
+    pub fn check(job: &Job, scene: &Scene, file: &str) -> Result<Vec<String>> {
+        let mut warnings = Vec::new();
+        for (i, camera) in job.cameras.iter().enumerate() {
+            let Some(name) = &camera.node else { continue };
+            let Some(node) = scene.camera(name) else {
+                let names: Vec<_> = scene.cameras.iter().map(|c| c.name.as_str()).collect();
+                let allowed = format!("a perspective camera of the scene: {}", names.join(", "));
+                return Err(Error::input(file, format!("camera[{i}].node"), name, allowed));
+            };
+            let asked = f64::from(camera.width) / f64::from(camera.height);
+            if let Some(given) = node.aspect.filter(|given| (asked / given - 1.0).abs() > 1e-3) {
+                let name = &camera.name;
+                warnings.push(format!("camera {name}: aspectRatio {given} of the scene is ignored, {asked} is used"));
+            }
+        }
+        for (i, gonio) in job.gonios.iter().enumerate() {
+            if Eye::from_gonio(scene, gonio).is_none() {
+                let allowed = "a point within 1 mm of a surface that reflects, with the normal of its reflecting side";
+                return Err(Error::input(
+                    file,
+                    format!("gonio[{i}].position"),
+                    format!("{:?}", gonio.position),
+                    allowed,
+                ));
+            }
+        }
+        Ok(warnings)
     }
 
     /// Direct light that is the same in every batch \[lx or cd/m2\]: of lux-meters the light of sources without
@@ -129,8 +149,7 @@ impl ReceiverSet {
                 let fixed = |m: &Option<Receiver>| m.map_or(f64::NAN, |r| from_lights(scene, &r).luminance());
                 meters.par_iter().map(fixed).collect()
             }
-            Bins::Film { eye: None, .. } => vec![f64::NAN; self.shape.bins()],
-            Bins::Film { eye: Some(Eye::Surface { .. }), .. } => {
+            Bins::Film { eye: Eye::Surface { .. }, .. } => {
                 (0..self.shape.bins()).map(|i| if self.is_below_horizon(i) { f64::NAN } else { 0.0 }).collect()
             }
             Bins::Film { .. } => Vec::new(),
@@ -139,7 +158,7 @@ impl ReceiverSet {
 
     /// True when all corners of the bin look from below a surface point.
     fn is_below_horizon(&self, i: usize) -> bool {
-        let Bins::Film { eye: Some(eye), .. } = &self.bins else { return false };
+        let Bins::Film { eye, .. } = &self.bins else { return false };
         let corners = [(0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (1.0, 1.0), (0.5, 0.5)];
         corners.iter().all(|&(x, y)| matches!(eye.gaze(self.film(i, 1, 0, DVec2::new(x, y))), Gaze::Nowhere))
     }
@@ -153,7 +172,7 @@ impl ReceiverSet {
         let x = (column + (across + within.x) / f64::from(strata)) / width as f64;
         let v = (down + within.y) / f64::from(strata);
         let y = match &self.bins {
-            Bins::Film { eye: Some(Eye::Sphere { .. } | Eye::Surface { .. }), .. } => {
+            Bins::Film { eye: Eye::Sphere { .. } | Eye::Surface { .. }, .. } => {
                 latitude(row / height, (row + 1.0) / height, v)
             }
             _ => (row + v) / height,
@@ -189,8 +208,7 @@ impl ReceiverSet {
         let mut rng = self.stream.generator(batch * self.shape.bins() as u64 + bin as u64);
         match &self.bins {
             Bins::Meters(meters) => self.sense_meter(scene, meters[bin].as_ref(), &mut rng),
-            Bins::Film { eye: Some(eye), strata } => self.sense_film(scene, eye, *strata, bin, &mut rng),
-            Bins::Film { eye: None, .. } => Sensed { direct: Colour::BLACK, receiver: None, existed: false },
+            Bins::Film { eye, strata } => self.sense_film(scene, eye, *strata, bin, &mut rng),
         }
     }
 
@@ -230,19 +248,12 @@ fn gaze(scene: &Scene, eye: &Eye, film: DVec2, rng: &mut Generator) -> Seen {
     }
 }
 
-fn camera_eye(scene: &Scene, camera: &Camera) -> Result<Eye> {
+/// The eye of a camera of a checked job.
+fn camera_eye(scene: &Scene, camera: &Camera) -> Eye {
     let aspect = f64::from(camera.width) / f64::from(camera.height);
-    let Some(name) = &camera.node else {
-        let view = camera.view().expect("a job is checked when it is read");
-        return Ok(Eye::from_view(scene, &view, aspect));
-    };
-    match scene.cameras.iter().find(|c| c.name == *name) {
-        Some(node) => Ok(Eye::from_node(node, aspect)),
-        None => {
-            let names: Vec<_> = scene.cameras.iter().map(|c| c.name.as_str()).collect();
-            let allowed = format!("a perspective camera of the scene: {}", names.join(", "));
-            Err(Error::input("job", format!("camera {} node", camera.name), name, allowed))
-        }
+    match &camera.node {
+        Some(name) => Eye::from_node(scene.camera(name).expect("the node was found when the job was planned"), aspect),
+        None => Eye::from_view(scene, &camera.view().expect("a job is checked when it is read"), aspect),
     }
 }
 

@@ -37,12 +37,10 @@ pub use png::MAP_ORIGIN;
 pub use text::text_summary;
 
 use crate::error::{Error, Result};
+use crate::farm::durable::replace;
 use crate::farm::merge::Merged;
 use crate::farm::plan::Plan;
 use crate::job::ReceiverKind;
-use std::fs::File;
-use std::io::{BufWriter, Write};
-use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use summary::Collector;
 use values::SetValues;
@@ -90,41 +88,4 @@ fn missing_text(merged: &Merged) -> String {
         ranges.push(format!("and {} more ranges", merged.missing.len() - MOST));
     }
     ranges.join(", ")
-}
-
-/// Writes the file at `path` beside it and renames it, so that a crash never leaves half a file under that name.
-fn replace(path: &Path, write: impl FnOnce(&mut BufWriter<&File>) -> std::io::Result<()>) -> Result<()> {
-    let dir = path.parent().unwrap_or(Path::new("."));
-    let result = || -> std::io::Result<()> {
-        // A temporary file is private by default; results are as readable as the user's umask lets them be.
-        let mode = std::fs::Permissions::from_mode(0o666);
-        let file = tempfile::Builder::new().prefix(".").suffix(".part").permissions(mode).tempfile_in(dir)?;
-        let mut writer = BufWriter::new(file.as_file());
-        write(&mut writer)?;
-        writer.flush()?;
-        drop(writer);
-        file.as_file().sync_all()?;
-        file.persist(path)?;
-        Ok(())
-    };
-    result().map_err(Error::io(path))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_failed_replacement_leaves_the_old_file_and_nothing_beside_it() {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("summary.json");
-        replace(&path, |to| to.write_all(b"old")).unwrap();
-        let failed = replace(&path, |to| {
-            to.write_all(b"half")?;
-            Err(std::io::Error::other("disk full"))
-        });
-        assert!(failed.unwrap_err().to_string().ends_with("summary.json: disk full"));
-        assert_eq!(std::fs::read(&path).unwrap(), b"old");
-        assert_eq!(std::fs::read_dir(&dir).unwrap().count(), 1);
-    }
 }

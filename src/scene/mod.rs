@@ -120,6 +120,11 @@ impl Scene {
         DVec3::from(position) + self.offset
     }
 
+    /// The camera node called `name`.
+    pub fn camera(&self, name: &str) -> Option<&CameraNode> {
+        self.cameras.iter().find(|c| c.name == name)
+    }
+
     /// The surface of a primitive.
     pub fn surface(&self, primitive: u32) -> &Surface {
         &self.surfaces[self.surface_of[primitive as usize] as usize]

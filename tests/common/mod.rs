@@ -35,7 +35,7 @@ impl Case {
 
     /// Scores of all batches, vertices limited to `orders`.
     pub fn batches(&self, orders: Range<u32>) -> (Vec<Vec<f64>>, Vec<BatchScores>) {
-        let realization = Realization::new(&self.job, &self.scene).unwrap().with_orders(orders);
+        let realization = Realization::new(&self.job, &self.scene).with_orders(orders);
         let scores = (0..self.job.run.batches).map(|i| realization.batch(i)).collect();
         (realization.fixed_direct().to_vec(), scores)
     }

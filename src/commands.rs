@@ -1,0 +1,122 @@
+//! One function for each subcommand: what it computes, what it prints, how it exits. Farm and report meet here.
+
+use crate::cli::Command;
+use lampyris::error::{Error, Result};
+use lampyris::farm::coordinator::{self, Options};
+use lampyris::farm::folder::{Folder, plan_text};
+use lampyris::farm::inputs::{Prepared, prepare};
+use lampyris::farm::merge::{Merged, merge};
+use lampyris::farm::plan::{Plan, human};
+use lampyris::farm::status::status;
+use lampyris::farm::worker::{self, Order};
+use lampyris::report;
+use std::path::{Path, PathBuf};
+
+/// What a command says and how it ends.
+#[derive(Debug)]
+pub struct Outcome {
+    /// For standard output.
+    pub text: String,
+    /// How it ends.
+    pub exit: Exit,
+}
+
+/// How the process ends when nothing failed; errors know their own exit codes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Exit {
+    /// All is done.
+    Done = 0,
+    /// Something was refused and said so.
+    Refused = 2,
+    /// Merged, but batches are missing.
+    Incomplete = 3,
+    /// Stopped by a signal after a checkpoint.
+    Stopped = 75,
+}
+
+/// Carries out `command`.
+///
+/// # Errors
+/// Whatever stops it.
+pub fn execute(command: Command) -> Result<Outcome> {
+    match command {
+        Command::Run { job, output, workers, quiet } => run(&job, output, Options { workers, quiet }),
+        Command::Plan { job, output } => plan(&job, output),
+        Command::Work { dir, shard, threads, parent } => work(&dir, shard, threads, parent),
+        Command::Status { dir, json } => show_status(&dir, json),
+        Command::Merge { dirs, output } => merge_and_report(&dirs, output),
+    }
+}
+
+fn run(job: &Path, output: Option<PathBuf>, options: Options) -> Result<Outcome> {
+    let (folder, plan) = establish(job, output)?;
+    let before = match coordinator::run(&folder, &plan, options)? {
+        coordinator::Ended::WasDone => format!("all {} batches were done before\n", plan.job.run.batches),
+        coordinator::Ended::Done => String::new(),
+        coordinator::Ended::Stopped => {
+            let text = format!("stopped; run the same command again to go on in {}\n", folder.root().display());
+            return Ok(Outcome { text, exit: Exit::Stopped });
+        }
+    };
+    let merged = merge_and_report(&[folder.root().to_owned()], None)?;
+    Ok(Outcome { text: before + &merged.text, ..merged })
+}
+
+fn plan(job: &Path, output: Option<PathBuf>) -> Result<Outcome> {
+    let (folder, plan) = establish(job, output)?;
+    let sizes = plan.sizes();
+    let text = format!(
+        "{}\n# {} shards in {}\n# memory of a worker about {}, batch scores kept in all {}\n\
+         # disk of a checkpoint about {}, of all {}\n",
+        plan_text(&plan),
+        plan.shard_count(),
+        folder.root().display(),
+        human(sizes.worker),
+        human(sizes.kept),
+        human(sizes.checkpoint),
+        human(sizes.checkpoints),
+    );
+    Ok(Outcome { text, exit: Exit::Done })
+}
+
+/// Plans `job` into its folder.
+fn establish(job: &Path, output: Option<PathBuf>) -> Result<(Folder, Plan)> {
+    let Prepared { plan, files } = prepare(job)?;
+    let folder = Folder::new(&output.unwrap_or_else(|| Path::new("out").join(&plan.name)));
+    folder.establish(&plan, &files)?;
+    Ok((folder, plan))
+}
+
+fn work(dir: &Path, shard: u64, threads: Option<usize>, parent: Option<i32>) -> Result<Outcome> {
+    let order = Order { folder: Folder::new(dir), shard, threads, parent };
+    Ok(match worker::work(&order)? {
+        worker::Ended::Done => Outcome { text: format!("shard {shard}: done\n"), exit: Exit::Done },
+        worker::Ended::Stopped => Outcome { text: format!("shard {shard}: stopped\n"), exit: Exit::Stopped },
+    })
+}
+
+fn show_status(dir: &Path, json: bool) -> Result<Outcome> {
+    let status = status(&Folder::new(dir))?;
+    let exit = if status.refused.is_empty() { Exit::Done } else { Exit::Refused };
+    let shown = |e| Error::Failed(format!("status has no JSON form: {e}"));
+    let text = if json { serde_json::to_string_pretty(&status).map_err(shown)? + "\n" } else { status.to_string() };
+    Ok(Outcome { text, exit })
+}
+
+fn merge_and_report(dirs: &[PathBuf], output: Option<PathBuf>) -> Result<Outcome> {
+    let folders: Vec<Folder> = dirs.iter().map(|d| Folder::new(d)).collect();
+    let (plan, merged) = merge(&folders)?;
+    let output = output.unwrap_or_else(|| dirs[0].clone());
+    std::fs::create_dir_all(&output).map_err(Error::io(&output))?;
+    report::write(&plan, &merged, &output)?;
+    let exit = if merged.missing.is_empty() { Exit::Done } else { Exit::Incomplete };
+    Ok(Outcome { text: merged_text(&plan, &merged, &output), exit })
+}
+
+fn merged_text(plan: &Plan, merged: &Merged, output: &Path) -> String {
+    let mut text = report::text_summary(plan, merged);
+    for range in &merged.missing {
+        text += &format!("incomplete: batches {} .. {} are missing\n", range.start, range.end - 1);
+    }
+    text + &format!("results in {}\n", output.display())
+}

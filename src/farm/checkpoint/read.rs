@@ -1,0 +1,256 @@
+//! Checkpoint file -> header, blocks, tally.
+
+use super::{Checksum, Content, Header, MAGIC, MAX_HEADER, PREAMBLE, VERSION};
+use super::{block_count, block_range, checksum, layout};
+use crate::error::{Error, Result};
+use crate::farm::plan::Plan;
+use crate::job::{Kept, SetShape};
+use crate::tally::{FLUX_BINS, MomentBlock, Moments, Replicates, SetTally, Tally};
+use serde::de::DeserializeOwned;
+use std::fs::File;
+use std::io::{self, ErrorKind, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+/// An open checkpoint of a known plan and shard, its header checked.
+#[derive(Debug)]
+pub struct Reader {
+    path: PathBuf,
+    file: File,
+    header: Header,
+    /// Where the sections begin \[bytes\].
+    base: u64,
+    shapes: Vec<SetShape>,
+}
+
+/// The header of the checkpoint of `shard` at `path`; None without a file.
+///
+/// # Errors
+/// As [`Reader::open`].
+pub fn read_header(path: &Path, plan: &Plan, shard: u64) -> Result<Option<Header>> {
+    Ok(Reader::open(path, plan, shard)?.map(|reader| reader.header))
+}
+
+impl Reader {
+    /// Opens the checkpoint of `shard` of `plan` at `path`; None without a file.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] for a file that is damaged, of a newer version, or of another plan or shard;
+    /// [`Error::Io`].
+    pub fn open(path: &Path, plan: &Plan, shard: u64) -> Result<Option<Reader>> {
+        let mut file = match File::open(path) {
+            Err(e) if e.kind() == ErrorKind::NotFound => return Ok(None),
+            other => other.map_err(Error::io(path))?,
+        };
+        let size = file.metadata().map_err(Error::io(path))?.len();
+        let (header, base) = read_start(&mut file, size).map_err(|fault| fault.at(path))?;
+        let shapes = plan.sets();
+        check_header(&header, plan, shard, &shapes).map_err(|reason| Error::refused(path, reason))?;
+        check_sections(&header, size - base).map_err(|reason| Error::refused(path, reason))?;
+        Ok(Some(Reader { path: path.to_owned(), file, header, base, shapes }))
+    }
+
+    /// What the file says about itself.
+    pub fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// One block of moments of a set.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] for damage; [`Error::Io`].
+    pub fn moments(&mut self, set: usize, block: u32) -> Result<MomentBlock> {
+        let shape = self.shapes[set].clone();
+        let colour = shape.kept == Kept::Moments { colour: true };
+        let bins = block_range(&shape, block).len();
+        self.section(Content::Moments { set: number(set), block }, |b: &MomentBlock| b.has_shape(bins, colour))
+    }
+
+    /// Every batch's score of a set.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] for damage; [`Error::Io`].
+    pub fn replicates(&mut self, set: usize) -> Result<Replicates> {
+        let (bins, batches) = (self.shapes[set].bins(), self.header.batches());
+        self.section(Content::Replicates { set: number(set) }, |r: &Replicates| r.has_shape(bins, batches))
+    }
+
+    /// The flux balance, every batch.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] for damage; [`Error::Io`].
+    pub fn flux(&mut self) -> Result<Replicates> {
+        let batches = self.header.batches();
+        self.section(Content::Flux, |r: &Replicates| r.has_shape(FLUX_BINS.len(), batches))
+    }
+
+    /// Direct light of a set that is the same in every batch; empty for zero everywhere.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] for damage; [`Error::Io`].
+    pub fn fixed_direct(&mut self, set: usize) -> Result<Vec<f64>> {
+        let bins = self.shapes[set].bins();
+        self.section(Content::FixedDirect { set: number(set) }, |v: &Vec<f64>| v.is_empty() || v.len() == bins)
+    }
+
+    /// Checksums of the sections of fixed direct light, in set order: equal exactly when the light is.
+    pub fn fixed_direct_checksums(&self) -> Vec<Checksum> {
+        let fixed = self.header.sections.iter().filter(|s| matches!(s.content, Content::FixedDirect { .. }));
+        fixed.map(|s| s.checksum).collect()
+    }
+
+    /// The whole tally, to go on from it.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] for damage; [`Error::Io`].
+    pub fn tally(&mut self) -> Result<Tally> {
+        let sets = (0..self.shapes.len()).map(|set| self.set_tally(set)).collect::<Result<_>>()?;
+        Ok(Tally { sets, flux: self.flux()?, digests: self.header.digests.clone() })
+    }
+
+    fn set_tally(&mut self, set: usize) -> Result<SetTally> {
+        let shape = self.shapes[set].clone();
+        let Kept::Moments { colour } = shape.kept else { return Ok(SetTally::Replicates(self.replicates(set)?)) };
+        let mut moments = Moments { n: self.header.batches(), bins: MomentBlock::new(0, colour) };
+        for block in 0..block_count(&shape) {
+            moments.bins.append(self.moments(set, block)?);
+        }
+        Ok(SetTally::Moments(moments))
+    }
+
+    /// Reads, verifies and decodes the section holding `content`.
+    fn section<T: DeserializeOwned>(&mut self, content: Content, fits: impl Fn(&T) -> bool) -> Result<T> {
+        let section = self.header.sections[self.position(content)];
+        let sought = self.file.seek(SeekFrom::Start(self.base + section.offset));
+        let bytes = sought.and_then(|_| read_exactly(&mut self.file, section.bytes));
+        let bytes = bytes.map_err(|e| Fault::from(e).at(&self.path))?;
+        if checksum(&bytes) != section.checksum {
+            return Err(Error::refused(&self.path, format!("damaged: wrong checksum of {content:?}")));
+        }
+        let decoded = decode(&bytes).filter(|t| fits(t));
+        decoded.ok_or_else(|| Error::refused(&self.path, format!("damaged: {content:?} is not of the plan's shape")))
+    }
+
+    /// Where `content` stands in the table, which was checked to be the layout of the plan.
+    fn position(&self, content: Content) -> usize {
+        let count = |shape: &SetShape| match shape.kept {
+            Kept::Moments { .. } => block_count(shape) as usize,
+            Kept::EveryBatch => 1,
+        };
+        let before = |set: usize| self.shapes[..set].iter().map(count).sum::<usize>();
+        match content {
+            Content::Moments { set, block } => before(set as usize) + block as usize,
+            Content::Replicates { set } => before(set as usize),
+            Content::Flux => before(self.shapes.len()),
+            Content::FixedDirect { set } => before(self.shapes.len()) + 1 + set as usize,
+        }
+    }
+}
+
+/// Why reading failed: the system, or the file.
+enum Fault {
+    Io(io::Error),
+    Bad(String),
+}
+
+impl From<io::Error> for Fault {
+    fn from(e: io::Error) -> Self {
+        match e.kind() {
+            ErrorKind::UnexpectedEof => Fault::Bad("damaged: truncated".to_owned()),
+            _ => Fault::Io(e),
+        }
+    }
+}
+
+impl Fault {
+    fn at(self, path: &Path) -> Error {
+        match self {
+            Fault::Io(e) => Error::io(path)(e),
+            Fault::Bad(reason) => Error::refused(path, reason),
+        }
+    }
+}
+
+/// Magic, version, header and checksum of a file of `size` bytes; with the header, where the sections begin.
+fn read_start(file: &mut File, size: u64) -> std::result::Result<(Header, u64), Fault> {
+    let bad = |reason: &str| Err(Fault::Bad(reason.to_owned()));
+    let preamble = read_exactly(file, (PREAMBLE as u64).min(size))?;
+    if preamble.len() < PREAMBLE || preamble[..8] != MAGIC {
+        return bad(if preamble.is_empty() { "damaged: empty" } else { "not a checkpoint of lampyris" });
+    }
+    let word = |at: usize| u32::from_le_bytes(preamble[at..at + 4].try_into().expect("a slice of four bytes"));
+    let (version, length) = (word(8), word(12));
+    if version != VERSION {
+        let age = if version > VERSION { "newer" } else { "unknown" };
+        return Err(Fault::Bad(format!("format version {version} is {age}; this program reads version {VERSION}")));
+    }
+    let base = PREAMBLE as u64 + u64::from(length) + size_of::<Checksum>() as u64;
+    if length > MAX_HEADER || base > size {
+        return bad("damaged: truncated, or a wrong header length");
+    }
+    let mut bytes = preamble;
+    bytes.extend(read_exactly(file, u64::from(length))?);
+    let sum = read_exactly(file, size_of::<Checksum>() as u64)?;
+    if checksum(&bytes)[..] != sum[..] {
+        return bad("damaged: wrong checksum of the header");
+    }
+    match decode(&bytes[PREAMBLE..]) {
+        Some(header) => Ok((header, base)),
+        None => bad("damaged: the header cannot be decoded"),
+    }
+}
+
+fn check_header(header: &Header, plan: &Plan, shard: u64, shapes: &[SetShape]) -> std::result::Result<(), String> {
+    let digest = plan.content_digest();
+    if header.plan != *digest.as_bytes() {
+        let theirs = blake3::Hash::from_bytes(header.plan).to_hex();
+        return Err(format!("of another plan: digest {}, not {}", &theirs[..16], &digest.to_hex()[..16]));
+    }
+    if header.shard != shard {
+        return Err(format!("holds shard {}, not {shard}", header.shard));
+    }
+    if header.batches() > plan.job.run.batches_per_shard {
+        return Err(format!("damaged: {} batches in a shard of {}", header.batches(), plan.job.run.batches_per_shard));
+    }
+    if !header.sections.iter().map(|s| s.content).eq(layout(shapes)) {
+        return Err("damaged: its sections are not those of the plan".to_owned());
+    }
+    if !(header.seconds.is_finite() && header.seconds >= 0.0) {
+        return Err("damaged: its time is not a time".to_owned());
+    }
+    Ok(())
+}
+
+/// Sections lie end to end and end with the file of which `available` bytes remain: no gaps, no trailing bytes.
+fn check_sections(header: &Header, available: u64) -> std::result::Result<(), String> {
+    let mut end = 0u64;
+    for section in &header.sections {
+        if section.offset != end {
+            return Err("damaged: its sections do not lie end to end".to_owned());
+        }
+        end = end.checked_add(section.bytes).ok_or("damaged: impossible section length")?;
+    }
+    match available.cmp(&end) {
+        std::cmp::Ordering::Less => Err("damaged: truncated".to_owned()),
+        std::cmp::Ordering::Equal => Ok(()),
+        std::cmp::Ordering::Greater => Err(format!("damaged: {} trailing bytes", available - end)),
+    }
+}
+
+/// Exactly `length` bytes, a length already checked against the size of the file.
+fn read_exactly(file: &mut File, length: u64) -> io::Result<Vec<u8>> {
+    let length = usize::try_from(length).map_err(|_| io::Error::from(ErrorKind::OutOfMemory))?;
+    let mut bytes = vec![0; length];
+    file.read_exact(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// All of `bytes` as one value: a prefix is not enough. A hostile length inside cannot allocate much: serde
+/// reserves at most a mebibyte ahead of the bytes that are really there.
+fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Option<T> {
+    let (value, rest) = postcard::take_from_bytes(bytes).ok()?;
+    rest.is_empty().then_some(value)
+}
+
+fn number(set: usize) -> u32 {
+    u32::try_from(set).expect("a job has fewer than 2^32 receiver sets")
+}

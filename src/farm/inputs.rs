@@ -1,0 +1,104 @@
+//! Files -> plan and scene: a job file beside its inputs becomes a plan with every input known by content, and a
+//! planned folder becomes the scene again, from the copies it keeps.
+
+use super::folder::Folder;
+use super::plan::{Input, Plan, SceneSummary};
+use super::receivers::ReceiverSet;
+use crate::error::{Error, Result};
+use crate::job::Job;
+use crate::scene::{Model, Scene, gltf};
+use std::fs;
+use std::path::{Component, Path};
+
+/// A plan and the content of the files it was made from.
+#[derive(Debug)]
+pub struct Prepared {
+    /// The plan.
+    pub plan: Plan,
+    /// The job file and every input with its bytes.
+    pub files: Vec<(Input, Vec<u8>)>,
+}
+
+/// Reads the job file at `path` with its scene, and plans it.
+///
+/// # Errors
+/// [`Error::Input`] for whatever the job or the scene gets wrong.
+pub fn prepare(path: &Path) -> Result<Prepared> {
+    let file = path.display().to_string();
+    let bytes = fs::read(path).map_err(|e| Error::input("command line", "JOB", &file, format!("a job file ({e})")))?;
+    let text = String::from_utf8(bytes).map_err(|_| Error::input(&file, "(encoding)", "not UTF-8", "UTF-8 text"))?;
+    let job = Job::parse(&text, &file)?;
+    let mut files = Vec::new();
+    let model = match &job.scene {
+        Some(name) => read_model(path, name, &mut files)?,
+        None => Model::default(),
+    };
+    let scene = Scene::new(model, &job)?;
+    let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let job_file = Input::of(&file_name(path), text.as_bytes());
+    let inputs = files.iter().map(|(input, _): &(Input, Vec<u8>)| input.clone()).collect();
+    let mut summary = summary(&scene);
+    summary.warnings.extend(ReceiverSet::check(&job, &scene, &file)?);
+    let plan = Plan::new(&name, job, job_file.clone(), inputs, summary)?;
+    files.push((job_file, text.into_bytes()));
+    Ok(Prepared { plan, files })
+}
+
+/// The scene of `plan` from the copies in `folder`.
+///
+/// # Errors
+/// [`Error::Refused`] for a copy that is damaged; [`Error::Input`] for a scene that asks for a file not planned.
+pub fn load_scene(folder: &Folder, plan: &Plan) -> Result<Scene> {
+    let Some((first, others)) = plan.inputs.split_first() else { return Scene::new(Model::default(), &plan.job) };
+    let bytes = folder.read_input(first)?;
+    let mut fetch = |uri: &str| match others.iter().find(|i| i.name == uri) {
+        Some(input) => folder.read_input(input),
+        None => Err(Error::input(&first.name, "uri", uri, "a file known to the plan")),
+    };
+    let model = gltf::load(&first.name, &bytes, &mut fetch)?;
+    Scene::new(model, &plan.job)
+}
+
+/// Loads the scene file `name` of the job at `job_path`; every file read is added to `files`, the scene first.
+fn read_model(job_path: &Path, name: &str, files: &mut Vec<(Input, Vec<u8>)>) -> Result<Model> {
+    let path = job_path.parent().unwrap_or(Path::new("")).join(name);
+    let bytes = fs::read(&path).map_err(|e| {
+        let allowed = format!("a .glb or .gltf file, relative to the job file ({e})");
+        Error::input(job_path.display(), "scene", name, allowed)
+    })?;
+    files.push((Input::of(name, &bytes), bytes.clone()));
+    let mut fetch = |uri: &str| {
+        if let Some((_, known)) = files[1..].iter().find(|(input, _)| input.name == uri) {
+            return Ok(known.clone());
+        }
+        let content = read_beside(&path, name, uri)?;
+        files.push((Input::of(uri, &content), content.clone()));
+        Ok(content)
+    };
+    gltf::load(name, &bytes, &mut fetch)
+}
+
+/// A file that the scene at `path` refers to: below its folder, nowhere else.
+fn read_beside(path: &Path, scene: &str, uri: &str) -> Result<Vec<u8>> {
+    let refused = |allowed: String| Error::input(scene, "uri", uri, allowed);
+    let inside = Path::new(uri).components().all(|c| matches!(c, Component::Normal(_)));
+    if uri.is_empty() || !inside {
+        return Err(refused("a file in the folder of the scene or below".to_owned()));
+    }
+    let beside = path.parent().unwrap_or(Path::new("")).join(uri);
+    fs::read(&beside).map_err(|e| refused(format!("a file that can be read ({e})")))
+}
+
+fn summary(scene: &Scene) -> SceneSummary {
+    SceneSummary {
+        triangles: scene.triangles(),
+        sources: scene.sources.len() as u64,
+        flux_lm: scene.sources.flux(),
+        bytes: scene.bytes(),
+        warnings: scene.warnings.clone(),
+    }
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}

@@ -1,0 +1,171 @@
+//! Job + scene summary -> [`Plan`] -> shards. Pure arithmetic: no threads, workers, host names, clock or files.
+//!
+//! Shard k holds the batches [k n, k n + n) with n = `batches_per_shard`, whatever the total and the number of
+//! workers. The digest covers all that determines the content of a shard, so a checkpoint belongs to a plan exactly
+//! when the digests agree; `batches`, `confidence` and `checkpoint_seconds` stay outside and may change.
+
+mod difference;
+mod size;
+
+pub use size::{KEPT_LIMIT, MAX_SHARDS, Sizes, human};
+
+use crate::error::Result;
+use crate::job::{Camera, Channels, Gonio, Grid, Job, Plane, Point, Roulette, SetShape, Source, Sphere};
+use serde::{Deserialize, Serialize};
+use std::ops::Range;
+
+/// Bumped whenever the numbers of any job change.
+pub const NUMERICS: u32 = 1;
+
+/// An input file, known by its content.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Input {
+    /// As the job or the scene file calls it.
+    pub name: String,
+    /// BLAKE3 of its bytes, hexadecimal.
+    pub digest: String,
+    /// Size \[bytes\].
+    pub bytes: u64,
+}
+
+/// What a scene is made of, for the reader of a plan.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SceneSummary {
+    /// Number of triangles.
+    pub triangles: u64,
+    /// Number of light sources, each emissive triangle one.
+    pub sources: u64,
+    /// Luminous flux of all sources \[lm\].
+    pub flux_lm: f64,
+    /// Memory of geometry and acceleration structure \[bytes\].
+    pub bytes: u64,
+    /// What was ignored or replaced, each with its effect.
+    pub warnings: Vec<String>,
+}
+
+/// A job with every default resolved, its inputs known by content, and its division into shards.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Plan {
+    /// Program version that made the plan.
+    pub program: String,
+    /// [`NUMERICS`] of that program.
+    pub numerics: u32,
+    /// Name of the job: the stem of its file name.
+    pub name: String,
+    /// BLAKE3 of all that determines the content of a shard, hexadecimal; not of batches, confidence,
+    /// checkpoint_seconds.
+    pub digest: String,
+    /// The scene's input files; the first is the scene itself.
+    pub inputs: Vec<Input>,
+    /// The job file's own bytes, kept beside the inputs.
+    pub job_file: Input,
+    /// What the scene is made of.
+    pub scene: SceneSummary,
+    /// The job, every default resolved.
+    pub job: Job,
+}
+
+/// All that determines the content of a shard, in the order in which it is hashed. Input files count by content.
+#[derive(Serialize)]
+struct Content<'a> {
+    numerics: u32,
+    seed: u64,
+    histories_per_batch: u64,
+    batches_per_shard: u64,
+    channels: Channels,
+    roulette_below: Option<f64>,
+    inputs: Vec<&'a str>,
+    cameras: Vec<CameraContent<'a>>,
+    gonios: &'a [Gonio],
+    grids: &'a [Grid],
+    points: &'a [Point],
+    planes: &'a [Plane],
+    spheres: &'a [Sphere],
+    sources: &'a [Source],
+}
+
+/// A camera with its absent fields marked: its own serialisation leaves them out, and two cameras could then
+/// have the same bytes.
+type Vector = Option<[f64; 3]>;
+type CameraContent<'a> = (&'a str, &'a Option<String>, [Vector; 3], Option<f64>, [u32; 3]);
+
+impl Input {
+    /// The input file `name` with the content `bytes`.
+    pub fn of(name: &str, bytes: &[u8]) -> Self {
+        let digest = blake3::hash(bytes).to_hex().to_string();
+        Input { name: name.to_owned(), digest, bytes: bytes.len() as u64 }
+    }
+}
+
+impl Plan {
+    /// The plan of `job`, called `name`, over the scene described by `inputs` and `scene`.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Input`] where the plan would have too many shards or keep too many batch scores.
+    pub fn new(name: &str, job: Job, job_file: Input, inputs: Vec<Input>, scene: SceneSummary) -> Result<Plan> {
+        let program = env!("CARGO_PKG_VERSION").to_owned();
+        let digest = String::new();
+        let mut plan =
+            Plan { program, numerics: NUMERICS, name: name.to_owned(), digest, inputs, job_file, scene, job };
+        plan.digest = plan.content_digest().to_hex().to_string();
+        plan.check_sizes()?;
+        Ok(plan)
+    }
+
+    /// BLAKE3 of all that determines the content of a shard.
+    pub fn content_digest(&self) -> blake3::Hash {
+        let Job { scene: _, run, transport, cameras, grids, points, gonios, planes, spheres, sources } = &self.job;
+        let content = Content {
+            numerics: self.numerics,
+            seed: run.seed,
+            histories_per_batch: run.histories_per_batch,
+            batches_per_shard: run.batches_per_shard,
+            channels: run.channels,
+            roulette_below: match transport.roulette_below {
+                Roulette::Below(share) => Some(share),
+                Roulette::Analog(_) => None,
+            },
+            inputs: self.inputs.iter().map(|i| i.digest.as_str()).collect(),
+            cameras: cameras.iter().map(camera_content).collect(),
+            gonios,
+            grids,
+            points,
+            planes,
+            spheres,
+            sources,
+        };
+        let bytes = postcard::to_stdvec(&content).expect("plain data of known length always has a postcard form");
+        blake3::hash(&bytes)
+    }
+
+    /// All receiver sets in the order of the tallies.
+    pub fn sets(&self) -> Vec<SetShape> {
+        self.job.sets()
+    }
+
+    /// Number of shards.
+    pub fn shard_count(&self) -> u64 {
+        self.job.run.batches.div_ceil(self.job.run.batches_per_shard)
+    }
+
+    /// The batches of shard `k`; empty beyond the last shard.
+    pub fn shard(&self, k: u64) -> Range<u64> {
+        let run = &self.job.run;
+        let start = k.saturating_mul(run.batches_per_shard).min(run.batches);
+        start..start.saturating_add(run.batches_per_shard).min(run.batches)
+    }
+
+    /// The batches of every shard, in order.
+    pub fn shards(&self) -> impl Iterator<Item = Range<u64>> + '_ {
+        (0..self.shard_count()).map(|k| self.shard(k))
+    }
+}
+
+fn camera_content(camera: &Camera) -> CameraContent<'_> {
+    let Camera { name, node, eye, target, up, vertical_fov_degrees, width, height, pixel_samples } = camera;
+    (name, node, [*eye, *target, *up], *vertical_fov_degrees, [*width, *height, *pixel_samples])
+}
+
+#[cfg(test)]
+mod tests;

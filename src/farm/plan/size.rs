@@ -1,0 +1,130 @@
+//! Memory and disk that a plan needs: estimates for its reader and for the choice of the number of workers, and
+//! the limits beyond which a plan is refused.
+
+use super::Plan;
+use crate::error::{Error, Result};
+use crate::job::{Kept, ReceiverKind, SetShape};
+use crate::tally::FLUX_BINS;
+
+/// Most memory that the batch scores kept by a whole job may take \[bytes\]: merging holds them all at once.
+pub const KEPT_LIMIT: u64 = 2 << 30;
+/// Most shards of a job: each is a file, and one process start.
+pub const MAX_SHARDS: u64 = 100_000;
+
+/// Program, libraries and stacks of one worker \[bytes\].
+const PROCESS: u64 = 32 << 20;
+/// Vertices of one history, generously: roulette ends most within ten.
+const VERTICES: u64 = 32;
+/// One vertex with its weight and surface \[bytes\].
+const VERTEX: u64 = 128;
+/// One receiver of a bin, placed anew in each batch \[bytes\].
+const RECEIVER: u64 = 256;
+/// One f64 \[bytes\].
+const NUMBER: u64 = 8;
+/// A batch score and its direct part \[bytes\].
+const KEPT: u64 = 2 * NUMBER;
+/// The digest by which a checkpoint remembers a batch \[bytes\].
+const DIGEST: u64 = 16;
+
+/// What a plan needs, estimated \[bytes\].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sizes {
+    /// Memory of one worker.
+    pub worker: u64,
+    /// Disk of one checkpoint of a whole shard; while it is replaced, twice that.
+    pub checkpoint: u64,
+    /// Disk of the checkpoints of all shards.
+    pub checkpoints: u64,
+    /// Batch scores kept by the whole job, in memory while merging.
+    pub kept: u64,
+}
+
+impl Plan {
+    /// Memory and disk this plan needs.
+    pub fn sizes(&self) -> Sizes {
+        let run = &self.job.run;
+        let sets = self.sets();
+        let of_shard = run.batches_per_shard.min(run.batches);
+        let tally: u64 = sets.iter().map(|s| tally_bytes(s, of_shard)).fold(0, u64::saturating_add);
+        let flux = kept_bytes(FLUX_BINS.len() as u64, of_shard).saturating_add(DIGEST * of_shard);
+        let scores: u64 = sets.iter().map(score_bytes).fold(0, u64::saturating_add);
+        let vertices = run.histories_per_batch.saturating_mul(VERTICES * VERTEX);
+        let checkpoint = tally.saturating_add(flux);
+        let worker = [PROCESS, self.scene.bytes, checkpoint, scores, vertices].into_iter().fold(0, u64::saturating_add);
+        let checkpoints = checkpoint.saturating_mul(self.shard_count());
+        Sizes { worker, checkpoint, checkpoints, kept: self.kept_bytes() }
+    }
+
+    fn kept_bytes(&self) -> u64 {
+        let kept = self.sets().into_iter().filter(|s| s.kept == Kept::EveryBatch).map(|s| s.bins() as u64);
+        let bins = kept.sum::<u64>() + FLUX_BINS.len() as u64;
+        kept_bytes(bins, self.job.run.batches)
+    }
+
+    /// Refuses a plan beyond the limits, naming the size and what would help.
+    pub(super) fn check_sizes(&self) -> Result<()> {
+        let file = &self.job_file.name;
+        let shards = self.shard_count();
+        if shards > MAX_SHARDS {
+            let value = format!("{} ({shards} shards)", self.job.run.batches_per_shard);
+            let allowed = format!("large enough for at most {MAX_SHARDS} shards");
+            return Err(Error::input(file, "run.batches_per_shard", value, allowed));
+        }
+        let kept = self.kept_bytes();
+        if kept <= KEPT_LIMIT {
+            return Ok(());
+        }
+        let limit = format!("at most {} of kept batch scores", human(KEPT_LIMIT));
+        let grids = self.job.grids.iter().enumerate().filter(|(_, g)| g.keep_batches);
+        match grids.max_by_key(|(_, g)| u64::from(g.columns) * u64::from(g.rows)) {
+            Some((i, grid)) => {
+                let field = format!("grid[{i}].keep_batches");
+                let value = format!("true (\"{}\", with the others {} of batch scores)", grid.name, human(kept));
+                Err(Error::input(file, field, value, format!("{limit}; set keep_batches = false")))
+            }
+            None => {
+                let value = format!("{} ({} of batch scores)", self.job.run.batches, human(kept));
+                Err(Error::input(file, "run.batches", value, format!("{limit}; take fewer batches of more histories")))
+            }
+        }
+    }
+}
+
+fn kept_bytes(bins: u64, batches: u64) -> u64 {
+    bins.saturating_mul(batches).saturating_mul(KEPT)
+}
+
+/// Tally of one set over a shard, with the direct light that is the same in every batch.
+fn tally_bytes(set: &SetShape, batches: u64) -> u64 {
+    let bins = set.bins() as u64;
+    let fixed = bins * NUMBER;
+    match set.kept {
+        Kept::Moments { colour } => fixed + bins * NUMBER * if colour { 8 } else { 5 },
+        Kept::EveryBatch => fixed.saturating_add(kept_bytes(bins, batches)),
+    }
+}
+
+/// Scores and receivers of one batch.
+fn score_bytes(set: &SetShape) -> u64 {
+    let numbers = match set.kept {
+        Kept::Moments { colour: true } => 7,
+        Kept::Moments { colour: false } | Kept::EveryBatch => 4,
+    };
+    let placed = match set.kind {
+        ReceiverKind::Camera | ReceiverKind::Gonio => RECEIVER,
+        ReceiverKind::Grid | ReceiverKind::Point => RECEIVER / 2,
+    };
+    set.bins() as u64 * (numbers * NUMBER + placed)
+}
+
+/// A size as people read it.
+pub fn human(bytes: u64) -> String {
+    let units = ["B", "KiB", "MiB", "GiB", "TiB", "PiB", "EiB"];
+    let mut value = bytes as f64;
+    let mut unit = 0;
+    while value >= 1024.0 && unit + 1 < units.len() {
+        value /= 1024.0;
+        unit += 1;
+    }
+    if unit == 0 { format!("{bytes} B") } else { format!("{value:.1} {}", units[unit]) }
+}

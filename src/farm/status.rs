@@ -1,0 +1,174 @@
+//! Checkpoint headers -> progress: batches done, rate, age, time left, relative error so far.
+//!
+//! Only headers are read, so asking is cheap and never disturbs a worker. The relative error is an estimate: each
+//! shard looks at its own batches, and their median is scaled to all batches done.
+
+use super::checkpoint::{Header, read_header};
+use super::folder::Folder;
+use super::plan::Plan;
+use crate::error::{Error, Result};
+use crate::tally::statistics::median;
+use serde::Serialize;
+use std::time::SystemTime;
+
+/// The progress of one shard.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ShardStatus {
+    /// Number of the shard.
+    pub shard: u64,
+    /// Batches done.
+    pub batches: u64,
+    /// Batches of the shard.
+    pub of: u64,
+    /// Time spent \[s\].
+    pub seconds: f64,
+    /// Age of the checkpoint \[s\].
+    pub age_seconds: u64,
+    /// Machine that wrote it.
+    pub host: String,
+    /// Median relative error of this shard alone, an estimate; None when nothing is known.
+    pub relative_error_estimate: Option<f64>,
+}
+
+/// The progress of a plan.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Status {
+    /// Name of the job.
+    pub job: String,
+    /// Digest of the plan.
+    pub plan: String,
+    /// Batches done.
+    pub batches: u64,
+    /// Batches of the plan.
+    pub of: u64,
+    /// Number of shards of the plan.
+    pub shard_count: u64,
+    /// Shards whose checkpoint is complete.
+    pub shards_done: u64,
+    /// Shards that seem to be at work: unfinished, and written not long ago.
+    pub shards_active: u64,
+    /// Batches per second of one worker; None before the first batch.
+    pub rate_of_a_worker: Option<f64>,
+    /// Time left with as many workers as now \[s\]; None when none is at work.
+    pub eta_seconds: Option<f64>,
+    /// Median relative error so far, an estimate; None when nothing is known.
+    pub relative_error_estimate: Option<f64>,
+    /// Time spent by all workers \[s\].
+    pub seconds: f64,
+    /// Every shard with a checkpoint.
+    pub shards: Vec<ShardStatus>,
+    /// Checkpoints that were refused, by name, and why.
+    pub refused: Vec<String>,
+}
+
+/// The progress of the plan in `folder`.
+///
+/// # Errors
+/// Whatever reading the plan says; checkpoints that are refused are listed in the status instead.
+pub fn status(folder: &Folder) -> Result<Status> {
+    let plan = folder.read_plan()?;
+    let (mut shards, mut refused) = (Vec::new(), Vec::new());
+    for (k, path) in folder.checkpoints()? {
+        match read_header(&path, &plan, k) {
+            Ok(Some(header)) => shards.push(ShardStatus::new(&plan, &header)),
+            Ok(None) => {}
+            Err(e @ Error::Refused { .. }) => refused.push(e.to_string()),
+            Err(e) => return Err(e),
+        }
+    }
+    Ok(Status::new(&plan, shards, refused))
+}
+
+impl ShardStatus {
+    /// From the header of a checkpoint.
+    pub fn new(plan: &Plan, header: &Header) -> Self {
+        let range = plan.shard(header.shard);
+        let now = SystemTime::UNIX_EPOCH.elapsed().map_or(0, |d| d.as_secs());
+        ShardStatus {
+            shard: header.shard,
+            batches: header.batches(),
+            of: range.end - range.start,
+            seconds: header.seconds,
+            age_seconds: now.saturating_sub(header.written),
+            host: header.host.clone(),
+            relative_error_estimate: finite(header.relative_error),
+        }
+    }
+
+    /// Of shard `k`, without a checkpoint.
+    pub fn not_begun(plan: &Plan, k: u64) -> Self {
+        let range = plan.shard(k);
+        let (of, host) = (range.end - range.start, String::new());
+        ShardStatus { shard: k, batches: 0, of, seconds: 0.0, age_seconds: 0, host, relative_error_estimate: None }
+    }
+
+    fn active(&self, checkpoint_seconds: f64) -> bool {
+        // A batch may be longer than the interval, so twice the interval and some more is "not long ago".
+        self.batches < self.of && self.age_seconds as f64 <= 2.0 * checkpoint_seconds + 30.0
+    }
+}
+
+impl Status {
+    /// From the progress of the shards of `plan`.
+    pub fn new(plan: &Plan, shards: Vec<ShardStatus>, refused: Vec<String>) -> Self {
+        let run = &plan.job.run;
+        let batches: u64 = shards.iter().map(|s| s.batches.min(s.of)).sum();
+        let seconds = shards.iter().map(|s| s.seconds).fold(0.0, |a, b| a + b);
+        let shards_active = shards.iter().filter(|s| s.active(run.checkpoint_seconds)).count() as u64;
+        let rate = finite(batches as f64 / seconds).filter(|&r| r > 0.0);
+        let left = (run.batches - batches) as f64;
+        let eta = rate.filter(|_| shards_active > 0).map(|r| left / (r * shards_active as f64));
+        Status {
+            job: plan.name.clone(),
+            plan: plan.digest.clone(),
+            batches,
+            of: run.batches,
+            shard_count: plan.shard_count(),
+            shards_done: shards.iter().filter(|s| s.batches >= s.of).count() as u64,
+            shards_active,
+            rate_of_a_worker: rate,
+            eta_seconds: eta,
+            relative_error_estimate: relative_error(&shards, batches),
+            seconds,
+            shards,
+            refused,
+        }
+    }
+}
+
+/// The error of one batch as each shard sees it, its median divided by sqrt(all batches).
+fn relative_error(shards: &[ShardStatus], batches: u64) -> Option<f64> {
+    let of_a_batch = shards.iter().filter_map(|s| Some(s.relative_error_estimate? * (s.batches as f64).sqrt()));
+    finite(median(of_a_batch) / (batches as f64).sqrt())
+}
+
+fn finite(x: f64) -> Option<f64> {
+    Some(x).filter(|x| x.is_finite())
+}
+
+impl std::fmt::Display for Status {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        writeln!(
+            f,
+            "{}: {} of {} batches, {} of {} shards done",
+            self.job, self.batches, self.of, self.shards_done, self.shard_count
+        )?;
+        if let Some(rate) = self.rate_of_a_worker {
+            writeln!(f, "{rate:.3} batches/s per worker, {} at work, {:.1} s spent", self.shards_active, self.seconds)?;
+        }
+        if let Some(eta) = self.eta_seconds {
+            writeln!(f, "about {eta:.0} s left")?;
+        }
+        if let Some(error) = self.relative_error_estimate {
+            writeln!(f, "median relative error so far: {:.3} % (an estimate)", 100.0 * error)?;
+        }
+        for s in self.shards.iter().filter(|s| s.batches < s.of) {
+            writeln!(
+                f,
+                "shard {}: {} of {} batches, written {} s ago on {}",
+                s.shard, s.batches, s.of, s.age_seconds, s.host
+            )?;
+        }
+        self.refused.iter().try_for_each(|line| writeln!(f, "{line}"))
+    }
+}

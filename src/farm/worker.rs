@@ -1,0 +1,246 @@
+//! One shard, from where its checkpoint left it: batch after batch into the tally, checkpoints in between.
+//!
+//! The only place with a thread pool, and with a clock that decides when to write. A worker knows neither other
+//! workers nor the final map; two workers on one shard by mistake compute the same batches and do no harm.
+
+use super::checkpoint::{self, Reader, Snapshot};
+use super::durable;
+use super::folder::Folder;
+use super::inputs;
+use super::plan::Plan;
+use super::realization::Realization;
+use crate::error::{Error, Result};
+use crate::tally::{SetTally, Tally, statistics::median};
+use nix::sys::prctl;
+use nix::sys::signal::Signal;
+use nix::unistd::{Pid, getppid};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant, SystemTime};
+
+/// Bins of a set that the estimate of the error so far looks at, at most.
+const SAMPLED_BINS: usize = 4096;
+/// The first checkpoint comes early, so that progress shows.
+const FIRST_CHECKPOINT: Duration = Duration::from_secs(1);
+
+/// What `work` was asked to do.
+#[derive(Clone, Debug)]
+pub struct Order {
+    /// The folder of the plan.
+    pub folder: Folder,
+    /// Number of the shard.
+    pub shard: u64,
+    /// Threads; None for as many as there are cores.
+    pub threads: Option<usize>,
+    /// Process whose end ends this one: the coordinator that started it.
+    pub parent: Option<i32>,
+}
+
+/// How a worker ended when nothing failed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ended {
+    /// Every batch of the shard is in the checkpoint.
+    Done,
+    /// A signal asked to stop; the batches so far are in the checkpoint.
+    Stopped,
+}
+
+/// Computes the rest of one shard.
+///
+/// # Errors
+/// [`Error::Input`] for a shard that the plan has not; [`Error::Refused`] for a checkpoint that is not this shard's
+/// (it is left as it is); [`Error::Io`].
+pub fn work(order: &Order) -> Result<Ended> {
+    durable::arm_fault()?;
+    let stop = stop_flag()?;
+    if let Some(parent) = order.parent {
+        die_with(parent, &stop)?;
+    }
+    let plan = order.folder.read_plan()?;
+    if order.shard >= plan.shard_count() {
+        let allowed = format!("0 .. {}", plan.shard_count() - 1);
+        return Err(Error::input("command line", "--shard", order.shard, allowed));
+    }
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(order.threads.unwrap_or(0)).build();
+    let pool = pool.map_err(|e| Error::Failed(format!("cannot start threads: {e}")))?;
+    pool.install(|| Work::resume(&order.folder, &plan, order.shard)?.finish(&order.folder, &stop))
+}
+
+/// A flag that SIGTERM and SIGINT set.
+fn stop_flag() -> Result<Arc<AtomicBool>> {
+    let flag = Arc::new(AtomicBool::new(false));
+    for signal in [signal_hook::consts::SIGTERM, signal_hook::consts::SIGINT] {
+        signal_hook::flag::register(signal, Arc::clone(&flag))
+            .map_err(|e| Error::Failed(format!("cannot catch signal {signal}: {e}")))?;
+    }
+    Ok(flag)
+}
+
+/// Asks the kernel for SIGTERM when `parent` ends, however it ends: no worker outlives its coordinator for long.
+fn die_with(parent: i32, stop: &AtomicBool) -> Result<()> {
+    prctl::set_pdeathsig(Signal::SIGTERM).map_err(|e| Error::Failed(format!("prctl: {e}")))?;
+    if getppid() != Pid::from_raw(parent) {
+        // It ended before the kernel knew our wish.
+        stop.store(true, Ordering::Relaxed);
+    }
+    Ok(())
+}
+
+/// The state of a shard in memory.
+struct Work<'a> {
+    plan: &'a Plan,
+    shard: u64,
+    path: PathBuf,
+    tally: Tally,
+    /// Direct light as the checkpoint has it; None without a checkpoint.
+    fixed_direct: Option<Vec<Vec<f64>>>,
+    /// Time spent before this process \[s\].
+    seconds: f64,
+    /// Batches in the checkpoint on disk.
+    saved: u64,
+}
+
+impl<'a> Work<'a> {
+    /// From the checkpoint, or from nothing.
+    fn resume(folder: &Folder, plan: &'a Plan, shard: u64) -> Result<Self> {
+        let path = folder.shard_path(shard);
+        let mut work =
+            Work { plan, shard, path, tally: Tally::new(&plan.sets()), fixed_direct: None, seconds: 0.0, saved: 0 };
+        if let Some(mut reader) = Reader::open(&work.path, plan, shard)? {
+            work.tally = reader.tally()?;
+            let fixed = (0..plan.sets().len()).map(|set| reader.fixed_direct(set)).collect::<Result<_>>()?;
+            work.fixed_direct = Some(fixed);
+            work.seconds = reader.header().seconds;
+            work.saved = work.tally.batches();
+        }
+        Ok(work)
+    }
+
+    /// Number of batches still to do.
+    fn missing(&self) -> u64 {
+        let range = self.plan.shard(self.shard);
+        (range.end - range.start).saturating_sub(self.tally.batches())
+    }
+
+    fn finish(mut self, folder: &Folder, stop: &AtomicBool) -> Result<Ended> {
+        if self.missing() == 0 {
+            return Ok(Ended::Done);
+        }
+        let scene = inputs::load_scene(folder, self.plan)?;
+        let realization = Realization::new(&self.plan.job, &scene);
+        let fixed = realization.fixed_direct();
+        self.check_fixed_direct(fixed)?;
+        let started = Instant::now();
+        let mut schedule = Schedule::new(self.plan.job.run.checkpoint_seconds);
+        let first = self.plan.shard(self.shard).start;
+        while self.missing() > 0 && !stop.load(Ordering::Relaxed) {
+            self.tally.accumulate(&realization.batch(first + self.tally.batches()));
+            if schedule.due(started.elapsed()) && self.missing() > 0 {
+                self.save(fixed, started.elapsed())?;
+                schedule.written(started.elapsed());
+            }
+        }
+        if self.tally.batches() > self.saved {
+            self.save(fixed, started.elapsed())?;
+        }
+        Ok(if self.missing() == 0 { Ended::Done } else { Ended::Stopped })
+    }
+
+    /// Direct light computed here must be that of the checkpoint, bit for bit: it is stored once and added once.
+    fn check_fixed_direct(&self, here: &[Vec<f64>]) -> Result<()> {
+        let bits = |sets: &[Vec<f64>]| -> Vec<Vec<u64>> {
+            sets.iter().map(|set| set.iter().map(|x| x.to_bits()).collect()).collect()
+        };
+        match &self.fixed_direct {
+            Some(there) if bits(there) != bits(here) => {
+                Err(Error::refused(&self.path, "its direct light is not the one computed here"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn save(&mut self, fixed_direct: &[Vec<f64>], elapsed: Duration) -> Result<()> {
+        let snapshot = Snapshot {
+            plan: self.plan,
+            shard: self.shard,
+            tally: &self.tally,
+            fixed_direct,
+            seconds: self.seconds + elapsed.as_secs_f64(),
+            written: SystemTime::UNIX_EPOCH.elapsed().map_or(0, |d| d.as_secs()),
+            host: &host_name(),
+            relative_error: relative_error(&self.tally, fixed_direct),
+        };
+        checkpoint::write(Path::new(&self.path), &snapshot)?;
+        self.saved = self.tally.batches();
+        Ok(())
+    }
+}
+
+/// When to write: after a second, then at intervals doubling up to the one of the job.
+struct Schedule {
+    interval: Duration,
+    longest: Duration,
+    next: Duration,
+}
+
+impl Schedule {
+    fn new(longest_seconds: f64) -> Self {
+        let longest = Duration::from_secs_f64(longest_seconds);
+        let interval = FIRST_CHECKPOINT.min(longest);
+        Schedule { interval, longest, next: interval }
+    }
+
+    fn due(&self, elapsed: Duration) -> bool {
+        elapsed >= self.next
+    }
+
+    fn written(&mut self, elapsed: Duration) {
+        self.interval = (2 * self.interval).min(self.longest);
+        self.next = elapsed + self.interval;
+    }
+}
+
+fn host_name() -> String {
+    nix::unistd::gethostname().map_or_else(|_| "unknown".to_owned(), |name| name.to_string_lossy().into_owned())
+}
+
+/// Median over the receiver sets of the median relative error of their bins so far; at most [`SAMPLED_BINS`] evenly
+/// spaced bins of a set are looked at. An estimate for progress, never for a result.
+fn relative_error(tally: &Tally, fixed_direct: &[Vec<f64>]) -> f64 {
+    let of_set = |(set, fixed): (&SetTally, &Vec<f64>)| {
+        let bins = match set {
+            SetTally::Moments(m) => m.bins.len(),
+            SetTally::Replicates(r) => r.bins as usize,
+        };
+        let error = |bin: usize| {
+            let estimate = match set {
+                SetTally::Moments(m) => m.bins.estimate(bin, m.n),
+                SetTally::Replicates(r) => r.estimate(bin),
+            };
+            estimate.shifted(fixed.get(bin).copied().unwrap_or(0.0)).relative_error()
+        };
+        median((0..bins).step_by(bins.div_ceil(SAMPLED_BINS).max(1)).map(error))
+    };
+    median(tally.sets.iter().zip(fixed_direct).map(of_set))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn checkpoints_come_early_then_at_doubling_intervals() {
+        let mut schedule = Schedule::new(3.0);
+        let mut times = Vec::new();
+        for tenth in 0..150 {
+            let now = Duration::from_millis(100 * tenth);
+            if schedule.due(now) {
+                schedule.written(now);
+                times.push(tenth);
+            }
+        }
+        assert_eq!(times, [10, 30, 60, 90, 120]);
+        assert!(Schedule::new(0.1).due(Duration::from_millis(100)));
+    }
+}

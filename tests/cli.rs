@@ -1,0 +1,265 @@
+//! The command line on wrong usage and bad input: exit codes and messages, run as a real process.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+use tempfile::TempDir;
+
+/// A small job that needs no scene file.
+const JOB: &str = r#"
+[run]
+histories_per_batch = 1
+batches = 4
+batches_per_shard = 2
+[[camera]]
+name = "view"
+eye = [0.0, 1.0, 3.0]
+target = [0.0, 1.0, 0.0]
+vertical_fov_degrees = 40.0
+width = 4
+height = 3
+[[grid]]
+name = "floor"
+origin = [0.0, 0.0, 0.0]
+u = [1.0, 0.0, 0.0]
+v = [0.0, 0.0, -1.0]
+normal = [0.0, 1.0, 0.0]
+columns = 2
+rows = 2
+[[point]]
+name = "desk"
+position = [0.0, 0.8, 0.0]
+normal = [0.0, 1.0, 0.0]
+[[gonio]]
+name = "eye"
+position = [0.0, 0.8, 0.0]
+width = 4
+height = 2
+[[plane]]
+point = [0.0, 0.0, 0.0]
+normal = [0.0, 1.0, 0.0]
+reflectance = 0.5
+[[sphere]]
+center = [0.0, 5.0, 0.0]
+radius = 1.0
+facing = "outward"
+reflectance = 0.5
+[[source]]
+kind = "omni"
+position = [0.0, 2.0, 0.0]
+intensity = 100.0
+"#;
+
+fn lampyris(folder: &Path, args: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lampyris"));
+    command.current_dir(folder).args(args).env_remove("SLURM_ARRAY_TASK_ID").env_remove("LAMPYRIS_FAULT");
+    command.output().unwrap()
+}
+
+/// Runs and expects exit code `code`; returns what was said on standard error, or else on standard output.
+fn expect(folder: &Path, code: i32, args: &[&str]) -> String {
+    let output = lampyris(folder, args);
+    let said = String::from_utf8(output.stderr).unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(output.status.code(), Some(code), "{args:?}: {said}{text}");
+    assert!(!said.contains("panicked"), "{args:?}: {said}");
+    if said.is_empty() { text } else { said }
+}
+
+fn folder_with(job: &str) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("job.toml"), job).unwrap();
+    folder
+}
+
+/// A planned folder `out` beside the job.
+fn planned() -> TempDir {
+    let folder = folder_with(JOB);
+    expect(folder.path(), 0, &["plan", "job.toml", "-o", "out"]);
+    folder
+}
+
+#[test]
+fn bad_values_in_a_job_are_named_with_field_value_and_range() {
+    // (what stands in the job, what somebody typed instead, fragment of the message)
+    let cases = [
+        ("batches = 4", "batches = 0", "run.batches = 0: 1 .. 4294967296"),
+        ("batches = 4", "batches = -4", "run.batches (line 4) = batches = -4: invalid value: integer `-4`"),
+        ("batches = 4", "batches = \"many\"", "run.batches (line 4) = batches = \"many\": invalid type: string"),
+        ("[run]", "[run]\nseed = -1", "run.seed (line 3) = seed = -1: invalid value"),
+        ("[run]", "[run]\nhistories = 3", "run.histories (line 3) = histories = 3: unknown field `histories`"),
+        ("[run]", "[run]\nconfidence = 1.0", "run.confidence = 1: between 0 and 1, exclusive"),
+        ("[run]", "[run]\nconfidence = nan", "run.confidence = NaN: between 0 and 1, exclusive"),
+        ("[run]", "[run]\ncheckpoint_seconds = 0", "run.checkpoint_seconds = 0: 0.1 .. 86400"),
+        ("[run]", "[run]\nchannels = \"spectral\"", "unknown variant `spectral`, expected `luminance` or `rgb`"),
+        ("[run]", "[transport]\nroulette_below = 2\n[run]", "transport.roulette_below = 2: above 0 and at most 1"),
+        ("[run]", "[transport]\nroulette_below = \"no\"\n[run]", "transport.roulette_below"),
+        ("[run]", "[run", "job.toml: (syntax) (line 2) = [run:"),
+        ("batches_per_shard = 2", "batches_per_shard = 0", "run.batches_per_shard = 0: 1 .. 1048576"),
+        ("width = 4\nheight = 3", "width = 0\nheight = 3", "camera[0].width = 0: 1 .. 65536"),
+        ("width = 4\nheight = 3", "width = 60000\nheight = 60000", "camera[0].width x height = 3600000000: at most"),
+        ("height = 3", "height = 3\npixel_samples = 3", "camera[0].pixel_samples = 3: 1, 4, 9 or 16"),
+        ("vertical_fov_degrees = 40.0", "vertical_fov_degrees = 180", "camera[0].vertical_fov_degrees = 180: between"),
+        ("vertical_fov_degrees = 40.0", "", "camera[0] = (incomplete): either node, or all of eye, target"),
+        ("target = [0.0, 1.0, 0.0]", "target = [0.0, 1.0, 3.0]", "camera[0].target minus eye"),
+        (
+            "vertical_fov_degrees = 40.0",
+            "vertical_fov_degrees = 40\nup = [0, 0, 1]",
+            "camera[0].up = [0.0, 0.0, 1.0]: not",
+        ),
+        (
+            "eye = [0.0, 1.0, 3.0]",
+            "node = \"camera\"\neye = [0.0, 1.0, 3.0]",
+            "camera[0].node = camera: a node, or eye",
+        ),
+        ("name = \"floor\"", "name = \"view\"", "name = view: a name used only once"),
+        ("name = \"floor\"", "name = \"../floor\"", "name = ../floor: 1 .. 64 letters, digits"),
+        ("name = \"floor\"", "name = \"summary\"", "name = summary: any name but points, summary and flux"),
+        ("normal = [0.0, 1.0, 0.0]\ncolumns", "normal = [0, 0, 0]\ncolumns", "grid[0].normal = [0.0, 0.0, 0.0]: three"),
+        ("columns = 2", "columns = 70000", "grid[0].columns = 70000: 1 .. 65536"),
+        ("columns = 2\nrows = 2", "columns = 16000\nrows = 16000", "grid[0].keep_batches = true (\"floor\", with the"),
+        ("position = [0.0, 0.8, 0.0]\nwidth", "position = [0, inf, 0]\nwidth", "gonio[0].position = [0.0, inf, 0.0]"),
+        ("name = \"eye\"", "name = \"eye\"\nsurface = true", "gonio[0].normal = (missing): needed with surface = true"),
+        (
+            "name = \"eye\"",
+            "name = \"eye\"\nnormal = [0, 1, 0]",
+            "gonio[0].normal = [0.0, 1.0, 0.0]: only with surface",
+        ),
+        ("reflectance = 0.5\n[[sphere]]", "reflectance = 1.5\n[[sphere]]", "plane[0].reflectance = 1.5: 0 .. 1"),
+        ("radius = 1.0", "radius = 0.0", "sphere[0].radius = 0: above 0, at most 1e6"),
+        ("facing = \"outward\"", "facing = \"up\"", "unknown variant `up`, expected `inward` or `outward`"),
+        ("kind = \"omni\"", "kind = \"laser\"", "unknown variant `laser`, expected `omni`"),
+        ("[run]", "scene = \"gone.glb\"\n[run]", "scene = gone.glb: a .glb or .gltf file, relative to the job file"),
+    ];
+    for (from, to, fragment) in cases {
+        assert!(JOB.contains(from), "{from}");
+        let folder = folder_with(&JOB.replacen(from, to, 1));
+        let said = expect(folder.path(), 2, &["plan", "job.toml", "-o", "out"]);
+        assert!(said.contains(fragment) && said.contains("job.toml"), "{to}\n  expected {fragment}\n  said {said}");
+        assert!(!folder.path().join("out").exists(), "{to}: a folder was made for a job that is wrong");
+    }
+}
+
+#[test]
+fn jobs_without_receivers_light_or_text_are_refused() {
+    let without = |start: &str, end: &str| {
+        let (head, tail) = JOB.split_once(start).unwrap();
+        let end = if end.is_empty() { tail.len() } else { tail.find(end).unwrap() };
+        format!("{head}{}", &tail[end..])
+    };
+    let dark = folder_with(&without("[[source]]", ""));
+    assert!(expect(dark.path(), 2, &["run", "job.toml"]).contains("scene = (missing): a scene file, or planes"));
+    let blind = folder_with(&without("[[camera]]", "[[plane]]"));
+    assert!(expect(blind.path(), 2, &["run", "job.toml"]).contains("receivers = 0: at least one [[camera]]"));
+    fs::write(blind.path().join("job.toml"), [0xff, 0xfe, 0x00]).unwrap();
+    assert!(expect(blind.path(), 2, &["run", "job.toml"]).contains("(encoding) = not UTF-8"));
+    assert!(expect(blind.path(), 2, &["run", "none.toml"]).contains("JOB = none.toml: a job file (No such file"));
+    assert!(expect(blind.path(), 2, &["run", "."]).contains("JOB = .: a job file"));
+}
+
+#[test]
+fn wrong_usage_is_exit_code_2() {
+    let folder = folder_with(JOB);
+    let cases: [(&[&str], &str); 8] = [
+        (&[], "Usage"),
+        (&["render", "job.toml"], "unrecognized subcommand 'render'"),
+        (&["run"], "<JOB>"),
+        (&["run", "job.toml", "-w", "0"], "allowed: 1 .. 65536"),
+        (&["run", "job.toml", "--seed", "3"], "unexpected argument '--seed'"),
+        (&["work", "out"], "--shard <K>"),
+        (&["work", "out", "--shard", "-1"], "unexpected argument '-1'"),
+        (&["merge"], "<DIR>"),
+    ];
+    for (args, fragment) in cases {
+        let said = expect(folder.path(), 2, args);
+        assert!(said.contains(fragment), "{args:?}: {said}");
+    }
+}
+
+#[test]
+fn every_help_has_an_example() {
+    let folder = folder_with(JOB);
+    for command in ["run", "plan", "work", "status", "merge"] {
+        let text = expect(folder.path(), 0, &[command, "--help"]);
+        assert!(text.contains("Example") && text.contains(&format!("lampyris {command}")), "{text}");
+    }
+    assert!(expect(folder.path(), 0, &["--help"]).contains("75"));
+}
+
+#[test]
+fn folders_without_a_plan_or_with_another_are_refused() {
+    let folder = planned();
+    let at = folder.path();
+    for args in [&["work", "none", "--shard", "0"][..], &["status", "none"], &["merge", "none"]] {
+        assert!(expect(at, 2, args).contains("none: plan.toml = (missing): a folder made by `lampyris plan`"));
+    }
+    assert!(expect(at, 2, &["merge", "out"]).contains("out: refused: holds no checkpoint yet: nothing to merge"));
+    assert!(expect(at, 2, &["work", "out", "--shard", "2"]).contains("--shard = 2: 0 .. 1"));
+    fs::write(at.join("other.toml"), JOB.replace("width = 4\nheight = 3", "width = 5\nheight = 3")).unwrap();
+    let said = expect(at, 2, &["run", "other.toml", "-o", "out"]);
+    assert!(said.contains("the job is no longer the one planned here"), "{said}");
+    assert!(said.contains("camera[0].width: 4 in the plan, 5 now"), "{said}");
+    fs::write(at.join("fewer.toml"), JOB.replace("batches = 4", "batches = 3")).unwrap();
+    let said = expect(at, 2, &["plan", "fewer.toml", "-o", "out"]);
+    assert!(said.contains("run.batches: 4 in the plan, 3 now (more batches extend"), "{said}");
+    let said = expect(at, 0, &["plan", "job.toml", "-o", "out"]);
+    assert!(said.contains("# 2 shards in out"), "{said}");
+}
+
+#[test]
+fn an_edited_or_damaged_plan_is_refused() {
+    let edits = [
+        ("seed = 1", "seed = 2", "edited or damaged: its digest is not that of its content"),
+        ("numerics = 1", "numerics = 9", "NUMERICS 9 of program"),
+        ("batches = 4", "batches = 0", "run.batches = 0: 1 .."),
+        ("seed = 1", "seed = ", "not a plan"),
+        ("seed = 1", "seed = 1\nspeed = 1", "not a plan: unknown field `speed`"),
+        ("digest = \"", "digest = \"../", "damaged: an input has no digest of 64 hexadecimal digits"),
+    ];
+    for (from, to, fragment) in edits {
+        let folder = planned();
+        let path = folder.path().join("out/plan.toml");
+        let text = fs::read_to_string(&path).unwrap();
+        assert!(text.contains(from), "{from}");
+        fs::write(&path, text.replace(from, to)).unwrap();
+        let said = expect(folder.path(), 2, &["status", "out"]);
+        assert!(said.contains(fragment) && said.contains("plan.toml"), "{to}: {said}");
+    }
+}
+
+#[test]
+fn a_checkpoint_that_is_none_stops_everything_and_stays() {
+    let folder = planned();
+    let at = folder.path();
+    let path = at.join("out/shards/shard-000001.ckpt");
+    fs::write(&path, "precious, and none of ours").unwrap();
+    let fragment = "shard-000001.ckpt: refused: not a checkpoint of lampyris";
+    for args in [
+        &["work", "out", "--shard", "1"][..],
+        &["run", "job.toml", "-o", "out", "-q"],
+        &["status", "out"],
+        &["merge", "out"],
+    ] {
+        let said = expect(at, 2, args);
+        assert!(said.contains(fragment), "{args:?}: {said}");
+    }
+    assert_eq!(fs::read(&path).unwrap(), b"precious, and none of ours");
+}
+
+#[test]
+fn a_scene_that_cannot_be_read_beside_its_job_is_named() {
+    let folder = folder_with(&format!("scene = \"../gone/room.glb\"\n{JOB}"));
+    let said = expect(folder.path(), 2, &["run", "job.toml", "-q"]);
+    assert!(said.contains("job.toml: scene = ../gone/room.glb: a .glb or .gltf file"), "{said}");
+}
+
+#[test]
+fn a_fault_that_names_no_step_is_refused() {
+    let folder = planned();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lampyris"));
+    command.current_dir(folder.path()).args(["work", "out", "--shard", "0"]).env("LAMPYRIS_FAULT", "sometime:1");
+    let output = command.output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(said.contains("LAMPYRIS_FAULT = sometime:1: <step>:<count> with a step among after-create"), "{said}");
+}
