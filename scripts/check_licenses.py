@@ -32,7 +32,8 @@ def test():
     for good in ["MIT", "MIT OR Apache-2.0", "MIT/Apache-2.0", "Apache-2.0 WITH LLVM-exception OR GPL-2.0",
                  "(MIT OR LGPL-2.1-or-later) AND Unicode-3.0"]:  # fmt: skip
         assert acceptable(good), good
-    for bad in ["", "GPL-3.0", "AGPL-3.0-only", "MIT AND GPL-2.0", "(MIT OR ISC) AND LGPL-3.0", "GPL-2.0 WITH exception"]:
+    for bad in ["", "GPL-3.0", "AGPL-3.0-only", "MIT AND GPL-2.0", "(MIT OR ISC) AND LGPL-3.0",
+                "GPL-2.0 WITH exception"]:  # fmt: skip
         assert not acceptable(bad), bad
 
 
