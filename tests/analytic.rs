@@ -239,7 +239,7 @@ fn white_furnace_order_by_order_and_in_luminance() {
 /// Nodes and weights of the Gauss-Legendre rule with six points on the unit interval.
 fn gauss() -> Vec<(f64, f64)> {
     let half = [
-        (0.932_469_514_203_152_1, 0.171_324_492_379_170_4),
+        (0.932_469_514_203_152, 0.171_324_492_379_170_4),
         (0.661_209_386_466_264_5, 0.360_761_573_048_138_6),
         (0.238_619_186_083_196_9, 0.467_913_934_572_691),
     ];

@@ -20,6 +20,7 @@ const LAYERS: [&[&str]; 8] = [
 /// Inside `farm`, lowest first; modules of one row do not know each other.
 const FARM: [&[&str]; 6] = [
     &["plan", "durable"],
+    &["ordering", "receivers"],
     &["folder", "realization"],
     &["inputs", "checkpoint"],
     &["status"],

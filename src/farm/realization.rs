@@ -4,6 +4,7 @@
 //! then every tile of receivers sums all vertices in index order, so any number of threads gives the same bits.
 //! Each receiver set keeps the order in which its bins share tiles, found once from the centres of its bins.
 
+use super::ordering::kd_order;
 use super::receivers::{ReceiverSet, TileScores};
 use crate::job::{Channels, Job};
 use crate::random::{Domain, Stream};
@@ -22,6 +23,8 @@ pub struct Realization<'a> {
     job: &'a Job,
     scene: &'a Scene,
     sets: Vec<ReceiverSet>,
+    /// For each set its bins in the order in which they share tiles.
+    orders_of_bins: Vec<Vec<u32>>,
     fixed_direct: Vec<Vec<f64>>,
     trajectories: Stream,
     orders: Range<u32>,
@@ -31,9 +34,10 @@ impl<'a> Realization<'a> {
     /// Prepares the receivers of `job` in `scene`, in the current rayon pool.
     pub fn new(job: &'a Job, scene: &'a Scene) -> Self {
         let sets = ReceiverSet::all(job, scene);
-        let fixed_direct = sets.iter().map(|s| s.fixed_direct(scene)).collect();
+        let orders_of_bins = sets.iter().map(|s| order_of_bins(s, scene)).collect();
+        let fixed_direct = sets.iter().map(|s| fixed_direct(s, scene)).collect();
         let trajectories = Stream::new(job.run.seed, Domain::Trajectory, "");
-        Realization { job, scene, sets, fixed_direct, trajectories, orders: 1..u32::MAX }
+        Realization { job, scene, sets, orders_of_bins, fixed_direct, trajectories, orders: 1..u32::MAX }
     }
 
     /// The same realization with only the vertices x_n, n in `orders`, connected: for tests order by order.
@@ -50,7 +54,8 @@ impl<'a> Realization<'a> {
     /// The scores of the batch number `index`.
     pub fn batch(&self, index: u64) -> BatchScores {
         let (histories, flux) = self.trace(index);
-        let scores = self.sets.par_iter().map(|set| self.score(set, index, &histories)).collect();
+        let sets = self.sets.par_iter().zip(&self.orders_of_bins);
+        let scores = sets.map(|(set, order)| self.score(set, order, index, &histories)).collect();
         let per_history = 1.0 / self.job.run.histories_per_batch as f64;
         let flux = [flux.emitted, flux.absorbed, flux.escaped, flux.lost, flux.met_delta].map(|x| x * per_history);
         BatchScores { sets: scores, flux }
@@ -85,17 +90,26 @@ impl<'a> Realization<'a> {
     }
 
     /// The scores of one receiver set.
-    fn score(&self, set: &ReceiverSet, batch: u64, histories: &Connectors) -> Scores {
+    fn score(&self, set: &ReceiverSet, order: &[u32], batch: u64, histories: &Connectors) -> Scores {
         let channels = if self.job.run.channels == Channels::Rgb { 3 } else { 1 };
-        let tiles: Vec<TileScores> = set
-            .order()
-            .par_chunks(TILE)
-            .map(|bins| set.score_tile(self.scene, bins, batch, histories, channels))
-            .collect();
+        let tiles: Vec<TileScores> =
+            order.par_chunks(TILE).map(|bins| set.score_tile(self.scene, bins, batch, histories, channels)).collect();
         let mut scores = Scores::zero(set.shape());
-        for (bins, tile) in set.order().chunks(TILE).zip(tiles) {
+        for (bins, tile) in order.chunks(TILE).zip(tiles) {
             tile.scatter(bins, &mut scores);
         }
         scores
     }
+}
+
+/// The bins of `set` in the order in which they share tiles.
+fn order_of_bins(set: &ReceiverSet, scene: &Scene) -> Vec<u32> {
+    let centers: Vec<_> = (0..set.shape().bins()).into_par_iter().map(|i| set.center(scene, i)).collect();
+    kd_order(&centers)
+}
+
+/// Direct light of the bins of `set` that is the same in every batch; empty for zero everywhere.
+fn fixed_direct(set: &ReceiverSet, scene: &Scene) -> Vec<f64> {
+    let bins = if set.has_no_fixed_direct() { 0 } else { set.shape().bins() };
+    (0..bins).into_par_iter().map(|i| set.fixed_direct(scene, i)).collect()
 }

@@ -4,7 +4,6 @@
 //! drawn anew each batch, carries the connections. A lux-meter stays where it is, and its direct light from lights
 //! without extent is computed once.
 
-use super::ordering::kd_order;
 use crate::error::{Error, Result};
 use crate::job::{Camera, Job, SetShape};
 use crate::math::{DVec2, DVec3};
@@ -16,15 +15,12 @@ use crate::transport::connection::{Connected, Connectors, connect};
 use crate::transport::direct::{emitter_samples, from_emitters, from_lights};
 use crate::transport::eye::{Eye, Gaze, latitude};
 use crate::transport::receiver::{Receiver, Response, Seen, look, look_at};
-use rayon::prelude::*;
 
 /// One receiver set of a job, placed in a scene.
 pub struct ReceiverSet {
     shape: SetShape,
     bins: Bins,
     stream: Stream,
-    /// Bins in the order in which they share tiles.
-    order: Vec<u32>,
     histories: u64,
 }
 
@@ -73,16 +69,13 @@ impl ReceiverSet {
         for point in &job.points {
             bins.push(Bins::Meters(vec![meter(scene, point.position, point.normal)]));
         }
-        job.sets().into_iter().zip(bins).map(|(shape, bins)| ReceiverSet::new(job, scene, shape, bins)).collect()
+        job.sets().into_iter().zip(bins).map(|(shape, bins)| ReceiverSet::new(job, shape, bins)).collect()
     }
 
-    fn new(job: &Job, scene: &Scene, shape: SetShape, bins: Bins) -> Self {
+    fn new(job: &Job, shape: SetShape, bins: Bins) -> Self {
         let stream = Stream::new(job.run.seed, Domain::Receiver, &shape.name);
         let histories = job.run.histories_per_batch;
-        let mut set = ReceiverSet { shape, bins, stream, order: Vec::new(), histories };
-        let centers: Vec<DVec3> = (0..set.shape.bins()).into_par_iter().map(|i| set.center(scene, i)).collect();
-        set.order = kd_order(&centers);
-        set
+        ReceiverSet { shape, bins, stream, histories }
     }
 
     /// Name, size and keeping.
@@ -90,13 +83,8 @@ impl ReceiverSet {
         &self.shape
     }
 
-    /// Bins in the order in which they share tiles.
-    pub fn order(&self) -> &[u32] {
-        &self.order
-    }
-
     /// Where the centre of bin `i` looks, for the order of the tiles alone; infinite where nothing is seen.
-    fn center(&self, scene: &Scene, i: usize) -> DVec3 {
+    pub fn center(&self, scene: &Scene, i: usize) -> DVec3 {
         match &self.bins {
             Bins::Meters(meters) => meters[i].map_or(DVec3::INFINITY, |r| r.position),
             Bins::Film { eye, .. } => match eye.gaze(self.film(i, 1, 0, DVec2::splat(0.5))) {
@@ -141,24 +129,24 @@ impl ReceiverSet {
         Ok(warnings)
     }
 
-    /// Direct light that is the same in every batch \[lx or cd/m2\]: of lux-meters the light of sources without
-    /// extent, NaN inside a solid; of a map NaN where no direction of a bin can ever be seen, or nothing at all.
-    pub fn fixed_direct(&self, scene: &Scene) -> Vec<f64> {
+    /// Direct light of bin `i` that is the same in every batch \[lx or cd/m2\]: of a lux-meter the light of sources
+    /// without extent, NaN inside a solid; of a map 0, NaN where no direction of the bin is above the surface.
+    pub fn fixed_direct(&self, scene: &Scene, i: usize) -> f64 {
         match &self.bins {
-            Bins::Meters(meters) => {
-                let fixed = |m: &Option<Receiver>| m.map_or(f64::NAN, |r| from_lights(scene, &r).luminance());
-                meters.par_iter().map(fixed).collect()
-            }
-            Bins::Film { eye: Eye::Surface { .. }, .. } => {
-                (0..self.shape.bins()).map(|i| if self.is_below_horizon(i) { f64::NAN } else { 0.0 }).collect()
-            }
-            Bins::Film { .. } => Vec::new(),
+            Bins::Meters(meters) => meters[i].map_or(f64::NAN, |r| from_lights(scene, &r).luminance()),
+            Bins::Film { .. } if self.is_below_horizon(i) => f64::NAN,
+            Bins::Film { .. } => 0.0,
         }
+    }
+
+    /// True when direct light is zero and the same in every batch for all bins, so that none need be kept.
+    pub fn has_no_fixed_direct(&self) -> bool {
+        matches!(&self.bins, Bins::Film { eye: Eye::Camera { .. } | Eye::Sphere { .. }, .. })
     }
 
     /// True when all corners of the bin look from below a surface point.
     fn is_below_horizon(&self, i: usize) -> bool {
-        let Bins::Film { eye, .. } = &self.bins else { return false };
+        let Bins::Film { eye: eye @ Eye::Surface { .. }, .. } = &self.bins else { return false };
         let corners = [(0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (1.0, 1.0), (0.5, 0.5)];
         corners.iter().all(|&(x, y)| matches!(eye.gaze(self.film(i, 1, 0, DVec2::new(x, y))), Gaze::Nowhere))
     }
