@@ -70,7 +70,7 @@ pub fn attribute(dir: &Path, map: &str, name: &str) -> String {
     use exr::prelude::AttributeValue;
     let image = read_all_flat_layers_from_file(dir.join(format!("{map}.exr"))).unwrap();
     let attributes = &image.layer_data[0].attributes.other;
-    match attributes.iter().find(|(key, _)| key.to_string() == name).map(|(_, value)| value) {
+    match attributes.iter().find(|(key, _)| *key == name).map(|(_, value)| value) {
         Some(AttributeValue::Text(text)) => text.to_string(),
         other => panic!("{map}.exr: {name}: {other:?}"),
     }
