@@ -236,20 +236,30 @@ fn white_furnace_order_by_order_and_in_luminance() {
     assert_all(&all);
 }
 
-/// Grids over walls (origin, u, v; all with cells of `1 / per_metre`), which face u x v.
-fn wall_grids(walls: &[(DVec3, DVec3, DVec3)], per_metre: f64) -> String {
-    let grid = |(i, (origin, u, v)): (usize, &(DVec3, DVec3, DVec3))| {
-        let (columns, rows) = ((u.length() * per_metre).round(), (v.length() * per_metre).round());
-        let array = |p: DVec3| format!("{:?}", p.to_array());
-        format!(
-            "[[grid]]\nname = \"wall{i}\"\norigin = {}\nu = {}\nv = {}\nnormal = {}\ncolumns = {columns}\nrows = {rows}\n",
-            array(*origin),
-            array(*u),
-            array(*v),
-            array(u.cross(*v))
-        )
-    };
-    walls.iter().enumerate().map(grid).collect()
+/// Nodes and weights of the Gauss-Legendre rule with six points on the unit interval.
+fn gauss() -> Vec<(f64, f64)> {
+    let half = [
+        (0.932_469_514_203_152_1, 0.171_324_492_379_170_4),
+        (0.661_209_386_466_264_5, 0.360_761_573_048_138_6),
+        (0.238_619_186_083_196_9, 0.467_913_934_572_691),
+    ];
+    half.iter().flat_map(|&(x, w)| [(0.5 - 0.5 * x, 0.5 * w), (0.5 + 0.5 * x, 0.5 * w)]).collect()
+}
+
+/// Lux-meters at the nodes of every wall (origin, u, v; all of area one, facing u x v), and the weight of each.
+fn wall_meters(walls: &[(DVec3, DVec3, DVec3)]) -> (String, Vec<f64>) {
+    let mut toml = String::new();
+    let mut weights = Vec::new();
+    for &(origin, u, v) in walls {
+        for (a, wa) in gauss() {
+            for (b, wb) in gauss() {
+                let name = format!("p{}", weights.len());
+                toml += &point(&name, (origin + a * u + b * v).to_array(), u.cross(v).to_array());
+                weights.push(wa * wb / walls.len() as f64);
+            }
+        }
+    }
+    (toml, weights)
 }
 
 /// Mean indirect illuminance of a closed cavity of uniform reflectance: rho Phi / (S (1 - rho)), whatever its shape
@@ -257,10 +267,11 @@ fn wall_grids(walls: &[(DVec3, DVec3, DVec3)], per_metre: f64) -> String {
 fn mean_indirect(name: &str, walls: &[(DVec3, DVec3, DVec3)], rho: f64, mean: f64) -> Comparison {
     let mut model = Model::default();
     walls.iter().for_each(|&(origin, u, v)| add_quad(&mut model, origin, u, v, lambert(rho, 0.0)));
-    let job = run(384, 32) + &omni([0.4, 0.6, 0.5], 100.0) + &wall_grids(walls, 8.0);
+    let (meters, weights) = wall_meters(walls);
+    let job = run(512, 32) + &omni([0.4, 0.6, 0.5], 100.0) + &meters;
     let (_, batches) = Case::new(&job, model).batches(1..u32::MAX);
-    let bins: f64 = batches[0].sets.iter().map(|s| s.value.len() as f64).sum();
-    let of_batch = |b: &lampyris::tally::BatchScores| b.sets.iter().flat_map(|s| &s.value).sum::<f64>() / bins;
+    let of_batch =
+        |b: &lampyris::tally::BatchScores| b.sets.iter().zip(&weights).map(|(s, w)| w * s.value[0]).sum::<f64>();
     compare(name, common::Estimate::from_scores(batches.iter().map(of_batch)), mean * rho)
 }
 
