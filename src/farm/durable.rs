@@ -146,6 +146,18 @@ fn put(
     Ok(true)
 }
 
+/// Makes the folder at `path` where there is none, durably.
+///
+/// # Errors
+/// [`Error::Io`].
+pub fn make_folder(path: &Path) -> Result<()> {
+    if path.is_dir() {
+        return Ok(());
+    }
+    std::fs::create_dir_all(path).map_err(Error::io(path))?;
+    sync_folder(folder_of(path))
+}
+
 fn folder_of(path: &Path) -> &Path {
     path.parent().expect("replaced files lie in a folder")
 }

@@ -121,8 +121,7 @@ impl Folder {
             }
         }
         for sub in ["inputs", "shards"] {
-            let path = self.root.join(sub);
-            fs::create_dir_all(&path).map_err(Error::io(&path))?;
+            durable::make_folder(&self.root.join(sub))?;
         }
         for (input, bytes) in files {
             let path = self.input_path(input);

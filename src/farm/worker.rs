@@ -161,6 +161,8 @@ impl<'a> Work<'a> {
     }
 
     fn save(&mut self, fixed_direct: &[Vec<f64>], elapsed: Duration) -> Result<()> {
+        // Many a tool that copies a planned folder leaves out what is empty.
+        durable::make_folder(self.path.parent().expect("a checkpoint lies in a folder"))?;
         let snapshot = Snapshot {
             plan: self.plan,
             shard: self.shard,

@@ -79,7 +79,10 @@ impl<'a> Progress<'a> {
                 bar.set_position(done);
                 bar.set_message(message);
             }
-            Display::Lines { .. } => eprintln!("{done} of {} batches{message}", self.plan.job.run.batches),
+            Display::Lines { .. } => {
+                let comma = if message.is_empty() { "" } else { ", " };
+                eprintln!("{done} of {} batches{comma}{message}", self.plan.job.run.batches);
+            }
         }
     }
 
@@ -87,20 +90,21 @@ impl<'a> Progress<'a> {
     fn words(&self, shards: &[ShardStatus]) -> (u64, String) {
         let status = Status::new(self.plan, shards.to_vec(), Vec::new());
         let rate = status.batches.saturating_sub(self.before) as f64 / self.begun.elapsed().as_secs_f64();
-        let mut message = String::new();
+        let mut parts = Vec::new();
         if rate > 0.0 {
             let left = (status.of - status.batches) as f64 / rate;
-            message += &format!(", {rate:.2} batches/s, {left:.0} s left");
+            parts.push(format!("{rate:.2} batches/s, {left:.0} s left"));
         }
         if let Some(error) = status.relative_error_estimate {
-            message += &format!(", median relative error about {:.2} %", 100.0 * error);
+            parts.push(format!("median relative error about {:.2} %", 100.0 * error));
         }
-        (status.batches, message)
+        (status.batches, parts.join(", "))
     }
 }
 
+/// Two lines: on one, the words would leave no room for the bar in 80 columns.
 fn bar(batches: u64) -> ProgressBar {
-    let style = ProgressStyle::with_template("{wide_bar} {pos}/{len} batches{msg}");
+    let style = ProgressStyle::with_template("{wide_bar} {pos}/{len} batches\n{msg}");
     ProgressBar::new(batches).with_style(style.expect("the template is a constant that a test parses"))
 }
 

@@ -1,0 +1,18 @@
+//! Same job, same bits, on real processes: whatever the workers, threads, CPU, interruptions and order of merging, the
+//! decoded results are those of one straight run by one worker; or something is refused by name and nothing changes.
+//!
+//! Nothing here waits for luck. Kills and signals are sent at instants drawn from a recorded seed, each is counted only
+//! when it is proved to have hit a worker at work, and a test goes on, with fresh folders where needed, until it has
+//! enough of them.
+
+mod bits;
+mod changes;
+mod cpu;
+mod faults;
+mod kills;
+mod merging;
+mod place;
+mod process;
+mod refusals;
+mod signals;
+mod workers;
