@@ -135,7 +135,7 @@ def millimetres(x, y, z):
 
 
 def prism(base, height):
-    """Upright block over `base` (mm, in the order of a front upwards), fronts outward: sides, top and, last, the bottom."""
+    """Upright block over `base` (mm, in the order of a front upwards), fronts outward: sides, top, and last the bottom."""
     low = [millimetres(x, 0.0, z) for x, z in base]
     high = [millimetres(x, height, z) for x, z in base]
     after = [1, 2, 3, 0]

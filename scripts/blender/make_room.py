@@ -156,7 +156,8 @@ def dining_group():
     """A table and four chairs of one mesh under two parents: a turn, and a non-uniform scale inside it."""
     group = place("dining group", None, (3.45, 2.35, 0), degrees=14)
     stretched = place("dining stretched", None, scale=(1.12, 0.95, 1.0), parent=group)
-    legs = [block((x - 0.03, y - 0.03, 0.002), (x + 0.03, y + 0.03, 0.705)) for x in (-0.66, 0.66) for y in (-0.34, 0.34)]
+    feet = [(x, y) for x in (-0.66, 0.66) for y in (-0.34, 0.34)]
+    legs = [block((x - 0.03, y - 0.03, 0.002), (x + 0.03, y + 0.03, 0.705)) for x, y in feet]
     top = moved(cushion((0.75, 0.43, 0.02), power=0.12, sectors=64), (0, 0, 0.72))
     table_mesh = mesh("table", (top, "oak", True), *((leg, "oak", False) for leg in legs))
     place("table", table_mesh, parent=stretched)

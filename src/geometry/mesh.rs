@@ -15,14 +15,20 @@ use obvhs::ray::{Ray as BoxRay, RayHit};
 
 /// Triangles and their hierarchy.
 pub struct Mesh {
-    /// Corners in the order of the leaves of the hierarchy.
-    corners: Vec<[Vec3; 3]>,
-    /// Primitive number of each of `corners`.
-    primitive: Vec<u32>,
-    /// Where each primitive stands in `corners`.
+    /// In the order of the leaves of the hierarchy.
+    triangles: Vec<Triangle>,
+    /// Where each primitive stands in `triangles`.
     place: Vec<u32>,
     bvh: Bvh2,
     bounds: (DVec3, DVec3),
+}
+
+/// A triangle as rays meet it: (normal, x) = offset on its plane.
+struct Triangle {
+    corners: [Vec3; 3],
+    primitive: u32,
+    normal: DVec3,
+    offset: f64,
 }
 
 impl Default for Mesh {
@@ -40,27 +46,28 @@ impl Mesh {
             (low.min(p), high.max(p))
         });
         let bvh = build(triangles, bounds);
-        let primitive = bvh.primitive_indices.clone();
         let mut place = vec![0; triangles.len()];
-        for (at, &p) in primitive.iter().enumerate() {
-            place[p as usize] = at as u32;
+        for (at, &primitive) in bvh.primitive_indices.iter().enumerate() {
+            place[primitive as usize] = at as u32;
         }
-        Mesh { corners: primitive.iter().map(|&p| triangles[p as usize]).collect(), primitive, place, bvh, bounds }
+        let ordered = bvh.primitive_indices.iter().map(|&p| Triangle::new(triangles[p as usize], p));
+        Mesh { triangles: ordered.collect(), place, bvh, bounds }
     }
 
     /// Number of triangles.
     pub fn len(&self) -> usize {
-        self.corners.len()
+        self.triangles.len()
     }
 
     /// True without triangles.
     pub fn is_empty(&self) -> bool {
-        self.corners.is_empty()
+        self.triangles.is_empty()
     }
 
     /// Memory \[bytes\].
     pub fn bytes(&self) -> u64 {
-        (size_of_val(&self.corners[..]) + 12 * self.corners.len() + size_of_val(&self.bvh.nodes[..])) as u64
+        let bvh = size_of_val(&self.bvh.nodes[..]) + size_of_val(&self.bvh.primitive_indices[..]);
+        (size_of_val(&self.triangles[..]) + size_of_val(&self.place[..]) + bvh) as u64
     }
 
     pub(super) fn bounds(&self) -> (DVec3, DVec3) {
@@ -68,7 +75,7 @@ impl Mesh {
     }
 
     pub(super) fn triangle(&self, primitive: u32) -> [DVec3; 3] {
-        self.corners[self.place[primitive as usize] as usize].map(|p| p.as_dvec3())
+        self.triangles[self.place[primitive as usize] as usize].corners.map(|p| p.as_dvec3())
     }
 
     pub(super) fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
@@ -78,8 +85,10 @@ impl Mesh {
         let mut best: Option<(f64, u32)> = None;
         let box_ray = BoxRay::new_inf(origin, direction);
         self.bvh.ray_traverse(box_ray, &mut RayHit::none(), |_, at| {
-            let Some(t) = intersect(&self.corners[at], o, d) else { return f32::INFINITY };
-            let found = (t, self.primitive[at]);
+            let triangle = &self.triangles[at];
+            let limit = best.map_or(f64::INFINITY, |(t, _)| t);
+            let Some(t) = triangle.intersect(o, d, limit) else { return f32::INFINITY };
+            let found = (t, triangle.primitive);
             if best.is_none_or(|b| found < b) {
                 best = Some(found);
             }
@@ -98,7 +107,7 @@ impl Mesh {
     pub(super) fn blocks(&self, a: Vec3, b: Vec3) -> bool {
         let (o, d) = (a.as_dvec3(), (b - a).as_dvec3());
         let box_ray = BoxRay::new(a.into(), (b - a).into(), 0.0, 1.0);
-        !self.bvh.ray_traverse_miss(box_ray, |_, at| match intersect(&self.corners[at], o, d) {
+        !self.bvh.ray_traverse_miss(box_ray, |_, at| match self.triangles[at].intersect(o, d, 1.0) {
             Some(t) if t < 1.0 => 0.0,
             _ => f32::INFINITY,
         })
@@ -122,17 +131,24 @@ fn build(triangles: &[[Vec3; 3]], bounds: (DVec3, DVec3)) -> Bvh2 {
     build_bvh2(&boxes, BvhBuildParams::medium_build(), &mut Default::default())
 }
 
-/// Parameter t > 0 at which the line o + t d crosses the triangle, edges included.
-fn intersect(corners: &[Vec3; 3], o: DVec3, d: DVec3) -> Option<f64> {
-    let [v0, v1, v2] = corners.map(|p| p.as_dvec3());
-    let (a, b, c) = (v0 - o, v1 - o, v2 - o);
-    let edges = [d.dot(c.cross(b)), d.dot(a.cross(c)), d.dot(b.cross(a))];
-    let one_side = edges.iter().all(|&e| e >= 0.0) || edges.iter().all(|&e| e <= 0.0);
-    if !one_side {
-        return None;
+impl Triangle {
+    fn new(corners: [Vec3; 3], primitive: u32) -> Self {
+        let [a, b, c] = corners.map(|p| p.as_dvec3());
+        let normal = (b - a).cross(c - a);
+        Triangle { corners, primitive, normal, offset: normal.dot(a) }
     }
-    let normal = (v1 - v0).cross(v2 - v0);
-    let t = normal.dot(a) / normal.dot(d);
-    // Edge-on the quotient is infinite or undefined: a triangle seen edge-on is not there.
-    (t > 0.0 && t.is_finite()).then_some(t)
+
+    /// Parameter 0 < t <= limit at which the line o + t d crosses the triangle, edges included.
+    #[inline(always)]
+    fn intersect(&self, o: DVec3, d: DVec3, limit: f64) -> Option<f64> {
+        let t = (self.offset - self.normal.dot(o)) / self.normal.dot(d);
+        // Edge-on the quotient is infinite or undefined: a triangle seen edge-on is not there.
+        if !(t > 0.0 && t <= limit && t.is_finite()) {
+            return None;
+        }
+        let [a, b, c] = self.corners.map(|p| p.as_dvec3() - o);
+        let edges = [d.dot(c.cross(b)), d.dot(a.cross(c)), d.dot(b.cross(a))];
+        let one_side = edges.iter().all(|&e| e >= 0.0) || edges.iter().all(|&e| e <= 0.0);
+        one_side.then_some(t)
+    }
 }

@@ -5,6 +5,9 @@ use crate::job::{self, View};
 use crate::math::{DVec2, DVec3, PI, sin_cos, tan};
 use crate::scene::{CameraNode, Scene};
 
+/// Cosine below which a direction lies on the horizon of a surface point: what rounding makes of zero.
+const HORIZON: f64 = 1e-12;
+
 /// What looks: turns film positions into rays.
 #[derive(Clone, Debug)]
 pub enum Eye {
@@ -83,7 +86,7 @@ impl Eye {
             }
             Eye::Sphere { position } => Gaze::Along(Ray { origin: position, direction: map_direction(film) }),
             Eye::Surface { point } => match map_direction(film) {
-                to_eye if to_eye.dot(point.normal) > 0.0 => Gaze::At(point, -to_eye),
+                to_eye if to_eye.dot(point.normal) > HORIZON => Gaze::At(point, -to_eye),
                 _ => Gaze::Nowhere,
             },
         }

@@ -104,6 +104,11 @@ pub fn failures(all: &[Comparison]) -> Vec<String> {
 #[track_caller]
 pub fn assert_all(all: &[Comparison]) {
     assert!(!all.is_empty(), "nothing was compared");
+    for c in all {
+        // Shown by --nocapture: how far from the limits a passing test is.
+        let z = (c.estimate.mean - c.reference) / c.estimate.standard_error;
+        println!("{}: {} against {}, z = {z:.2}", c.name, c.estimate.mean, c.reference);
+    }
     let failures = failures(all);
     assert!(failures.is_empty(), "{} of {} comparisons fail:\n{}", failures.len(), all.len(), failures.join("\n"));
 }

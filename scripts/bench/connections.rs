@@ -1,0 +1,76 @@
+//! Connections per second of one thread, and trajectories per second: `cargo bench --bench connections`.
+//!
+//! Receivers are the pixels of a camera, connected to the vertices of one batch, visibility and sums included.
+//! Times are CPU time of the thread, medians of several runs; on a shared machine compare interleaved runs only.
+
+use lampyris::farm::realization::Realization;
+use lampyris::job::Job;
+use lampyris::random::{Domain, Stream};
+use lampyris::scene::{Model, Scene, gltf};
+use lampyris::transport::trajectory::trace;
+use nix::time::{ClockId, clock_gettime};
+use std::time::Duration;
+
+const RUNS: usize = 7;
+const HISTORIES: u64 = 64;
+
+fn main() {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread");
+    pool.install(|| {
+        for (name, side) in [("room", 128), ("cornell", 128), ("blender_room", 64)] {
+            bench(name, side);
+        }
+    });
+}
+
+fn bench(name: &str, side: u32) {
+    let camera = if name == "blender_room" { "camera_wide" } else { "camera" };
+    let text = format!(
+        "scene = \"{name}.glb\"\n[run]\nhistories_per_batch = {HISTORIES}\n[[camera]]\nname = \"view\"\n\
+         node = \"{camera}\"\nwidth = {side}\nheight = {side}\npixel_samples = 1\n"
+    );
+    let job = Job::parse(&text, "bench").expect("the job is right");
+    let scene = Scene::new(load(name), &job).expect("the scene is right");
+    let mut vertices = Vec::new();
+    let trajectories = Stream::new(job.run.seed, Domain::Trajectory, "");
+    let per_history = median(|| {
+        vertices.clear();
+        let start = thread_time();
+        (0..HISTORIES * 64).for_each(|h| {
+            trace(&scene, &job.transport, &mut trajectories.generator(h), &mut vertices);
+        });
+        (thread_time() - start).as_secs_f64() / (HISTORIES * 64) as f64
+    });
+    let per_batch = vertices.len() as f64 / 64.0;
+    let realization = Realization::new(&job, &scene);
+    let seconds = median(|| {
+        let start = thread_time();
+        std::hint::black_box(realization.batch(0));
+        (thread_time() - start).as_secs_f64()
+    });
+    let connections = per_batch * f64::from(side * side);
+    println!(
+        "{name}: {} triangles, {:.2} M connections/s, {:.2} us a history of {:.1} vertices",
+        scene.triangles(),
+        connections / seconds / 1e6,
+        per_history * 1e6,
+        per_batch / HISTORIES as f64
+    );
+}
+
+fn load(name: &str) -> Model {
+    let path = format!("{}/scenes/{name}.glb", env!("CARGO_MANIFEST_DIR"));
+    let bytes = std::fs::read(&path).expect("the scene ships with the project");
+    gltf::load(name, &bytes, &mut |uri| panic!("{uri}: the scene is one file")).expect("the scene is right")
+}
+
+fn median(mut run: impl FnMut() -> f64) -> f64 {
+    let mut times: Vec<f64> = (0..RUNS).map(|_| run()).collect();
+    times.sort_by(f64::total_cmp);
+    times[RUNS / 2]
+}
+
+/// CPU time of this thread.
+fn thread_time() -> Duration {
+    clock_gettime(ClockId::CLOCK_THREAD_CPUTIME_ID).expect("Linux has this clock").into()
+}

@@ -1,0 +1,27 @@
+#!/bin/bash
+# Tests that need programs beside the Rust toolchain: the EXR maps in OpenEXR's and OpenImageIO's own tools.
+# Installs what is missing (Debian); a tool that cannot be had is a failure.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+packages=(openexr openimageio-tools)
+tools=(exrheader exrinfo oiiotool iinfo)
+
+missing=()
+for package in "${packages[@]}"; do
+    dpkg-query -W -f '${Status}' "$package" 2>/dev/null | grep -q 'ok installed' || missing+=("$package")
+done
+if ((${#missing[@]})); then
+    as_root=$([[ $(id -u) == 0 ]] || echo sudo)
+    $as_root apt-get update -q
+    DEBIAN_FRONTEND=noninteractive $as_root apt-get install -q -y --no-install-recommends "${missing[@]}"
+fi
+for tool in "${tools[@]}"; do
+    command -v "$tool" >/dev/null || { echo "$tool is not here although ${packages[*]} are installed" >&2; exit 1; }
+done
+
+cargo build --release --locked
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
+target/release/lampyris run -q scripts/external/room.toml -o "$folder"
+scripts/external/check_exr.py "$folder"
