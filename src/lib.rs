@@ -10,7 +10,8 @@
 //!
 //! L0 is what the surface emits, f \[1/sr\] how it reflects; K^n L0 is light reflected n times. Histories leave the
 //! sources and make chains of vertices x_1, x_2, ... with weights W_n, the flux that arrives there \[lm\]. From every
-//! vertex a connection goes to every receiver r, with u_n from x_n to r and the geometric factor G = |cos| |cos| V / d^2:
+//! vertex a connection goes to every receiver r; u_n is the direction from x_n to r, and G = |cos| |cos| V / d^2 the
+//! geometric factor with the visibility V:
 //!
 //! ```text
 //! E(r)   = E_0(r)   + E[ sum_n W_n f(x_n; w_n -> u_n) G(x_n,r) ]                  local estimation: illuminance [lx]
