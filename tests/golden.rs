@@ -13,7 +13,7 @@ use std::process::Command;
 const GOLDEN: (u32, &str, &str) = (
     1,
     "2bd2927ee219cbd533074da8771c1c8cfda51edc31bfa1a4188f10f3b772b332",
-    "bdf83ab386e3f4741f098d9f0a14784ae61d37b2b8036a6810a13fc215076107",
+    "09507440ba0ad8acea622248e368121921af85f3198e9de9e48466672274f373",
 );
 
 #[test]

@@ -7,6 +7,7 @@
 
 mod bits;
 mod changes;
+#[cfg(all(target_arch = "x86_64", target_env = "gnu"))]
 mod cpu;
 mod faults;
 mod kills;

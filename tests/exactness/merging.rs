@@ -67,7 +67,7 @@ fn twenty_orders_and_groupings_of_copies_and_prefixes_merge_into_the_same_bits()
     let place = Place::new();
     let prefixes = interrupted(&place);
     let whole = computed();
-    let shorter = prefixes.iter().filter(|(k, bytes)| *bytes != whole.0[&checkpoint(*k)]).count();
+    let shorter = prefixes.iter().filter(|(k, bytes)| bytes.len() < whole.0[&checkpoint(*k)].len()).count();
     assert!(shorter >= 2, "the prefixes of shard 0 at least are shorter than their shard");
     let mut draw = draws("merging");
     for round in 0..20 {

@@ -7,7 +7,7 @@ use crate::process::{
 use nix::sys::signal::Signal;
 
 const STOPPED: i32 = 75;
-const ATTEMPTS: usize = 400;
+const ATTEMPTS: u32 = 400;
 
 /// Stops workers by `signal` until three have stopped with batches that only the signal made them write down.
 fn stop_workers(signal: Signal, name: &str) {
@@ -16,7 +16,7 @@ fn stop_workers(signal: Signal, name: &str) {
     let mut draw = draws(name);
     let (mut stops, mut round) = (0, 0);
     let mut dir = place.planned("0");
-    for _ in 0..ATTEMPTS {
+    for attempt in 0..ATTEMPTS {
         if stops >= STOPS {
             break;
         }
@@ -27,8 +27,8 @@ fn stop_workers(signal: Signal, name: &str) {
         };
         let mut worker = start(&mut work(&dir, shard));
         wait_for("handlers", || (listens(pid(&worker)) || !alive(pid(&worker))).then_some(()));
-        // Before the first checkpoint is due, so that what is written is written for the signal; rarely after.
-        sleep_until_drawn(&mut draw, 150);
+        // Mostly before a checkpoint is due, so that what is written is written for the signal; later if it helps.
+        sleep_until_drawn(&mut draw, 150 + 10 * attempt);
         let had = batches(&dir, shard);
         send(pid(&worker), signal);
         match worker.wait().unwrap().code() {
