@@ -8,8 +8,9 @@
 //! ```
 //!
 //! with the mean over the uniform points of the cap of `microfacet`. The nodes are mu = t^4, t uniform: closer where
-//! grazing light meets the roughness, down to cosines below the least alpha. Between nodes A and B are linear in t, and the mean <a> = 2 int a mu dmu is
-//! that of the interpolated functions, so that the diffuse part made from them conserves energy exactly.
+//! grazing light meets the roughness, down to cosines below the least alpha. Between nodes A and B are linear in t,
+//! and the mean `<a>` = 2 int a mu dmu is that of the interpolated functions, so that the diffuse part made from them
+//! conserves energy exactly.
 
 use super::fresnel_rise;
 use super::microfacet::Microfacets;

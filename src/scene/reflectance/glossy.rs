@@ -6,7 +6,7 @@
 //! total = a(mu) + (1 - metallic) rho (1 - a(mu))  <=  1                                        directional albedo
 //! ```
 //!
-//! D V is in `microfacet`, the specular albedo a and its mean <a> in `albedo`. The mix that the glTF specification
+//! D V is in `microfacet`, the specular albedo a and its mean `<a>` in `albedo`. The mix that the glTF specification
 //! suggests, a diffuse part dimmed by F(h) alone, reflects up to 1.3 times the light received at grazing incidence;
 //! it is replaced by this one, which is reciprocal and conserves energy. Light reflected between facets more than
 //! once is not followed: a rough white metal reflects less than one, and never more.
