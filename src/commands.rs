@@ -110,13 +110,6 @@ fn merge_and_report(dirs: &[PathBuf], output: Option<PathBuf>) -> Result<Outcome
     std::fs::create_dir_all(&output).map_err(Error::io(&output))?;
     report::write(&plan, &merged, &output)?;
     let exit = if merged.missing.is_empty() { Exit::Done } else { Exit::Incomplete };
-    Ok(Outcome { text: merged_text(&plan, &merged, &output), exit })
-}
-
-fn merged_text(plan: &Plan, merged: &Merged, output: &Path) -> String {
-    let mut text = report::text_summary(plan, merged);
-    for range in &merged.missing {
-        text += &format!("incomplete: batches {} .. {} are missing\n", range.start, range.end - 1);
-    }
-    text + &format!("results in {}\n", output.display())
+    let text = format!("{}results in {}\n", report::text_summary(&plan, &merged), output.display());
+    Ok(Outcome { text, exit })
 }

@@ -18,7 +18,7 @@ const LAYERS: [&[&str]; 8] = [
 ];
 
 /// Inside `farm`, lowest first; modules of one row do not know each other.
-const FARM: [&[&str]; 6] = [
+const FARM: [&[&str]; 7] = [
     &["plan", "durable"],
     &["ordering", "receivers"],
     &["folder", "realization"],
