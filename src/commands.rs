@@ -5,7 +5,7 @@ use lampyris::error::{Error, Result};
 use lampyris::farm::coordinator::{self, Options};
 use lampyris::farm::folder::{Folder, plan_text};
 use lampyris::farm::inputs::{Prepared, prepare};
-use lampyris::farm::merge::{Merged, merge};
+use lampyris::farm::merge::merge;
 use lampyris::farm::plan::{Plan, human};
 use lampyris::farm::status::status;
 use lampyris::farm::worker::{self, Order};
