@@ -79,11 +79,12 @@ fn write_set(plan: &Plan, merged: &Merged, values: &SetValues, dir: &Path) -> Re
     replace(&dir.join(format!("{name}.png")), |to| png::write(plan, merged, values, to))
 }
 
-/// Batches that are missing, `32-64, 96-128`, half-open; empty when complete. A long list is cut short: the whole of
-/// it is in `summary.json`.
+/// Batches that are missing, first and last of each range, `32-63, 96-127`; empty when complete.
+/// A long list is cut short: the whole of it is in `summary.json`.
 fn missing_text(merged: &Merged) -> String {
     const MOST: usize = 8;
-    let mut ranges: Vec<String> = merged.missing.iter().take(MOST).map(|r| format!("{}-{}", r.start, r.end)).collect();
+    let mut ranges: Vec<String> =
+        merged.missing.iter().take(MOST).map(|r| format!("{}-{}", r.start, r.end - 1)).collect();
     if merged.missing.len() > MOST {
         ranges.push(format!("and {} more ranges", merged.missing.len() - MOST));
     }

@@ -81,7 +81,7 @@ fn exr_header_says_what_the_numbers_are() {
         ("inputDigests", "d1 r?om.glb; d2 room.bin"),
         ("programVersion", "0.1.0"),
         ("complete", "false"),
-        ("missingBatches", "4-8, 24-32"),
+        ("missingBatches", "4-7, 24-31"),
     ];
     for (name, text) in expected {
         assert_eq!(attribute(name), &AttributeValue::Text(Text::from(text)), "{name}");
