@@ -1,0 +1,165 @@
+//! Rays and segments against brute force in f64, and closed surfaces that nothing leaves.
+
+mod common;
+
+use common::scenes::{add_quad, lambert};
+use lampyris::geometry::{Geometry, Hit, Mesh, Plane, Ray, Sphere};
+use lampyris::math::{DVec3, Vec3};
+use lampyris::random::{Domain, Generator, Stream, sphere};
+use lampyris::scene::Model;
+
+fn generator(name: &str) -> Generator {
+    Stream::new(61, Domain::Receiver, name).generator(0)
+}
+
+fn in_box(rng: &mut Generator, half: f64) -> DVec3 {
+    let coordinate = |rng: &mut Generator| half * (2.0 * rng.uniform() - 1.0);
+    DVec3::new(coordinate(rng), coordinate(rng), coordinate(rng))
+}
+
+/// Triangles of all sizes, slivers and axis-aligned ones among them.
+fn soup(count: usize) -> Vec<[Vec3; 3]> {
+    let mut rng = generator("soup");
+    let triangle = |i: usize| {
+        let corner = in_box(&mut rng, 2.0);
+        let size = [1.0, 0.1, 0.01][i % 3];
+        let (mut u, mut v) = (size * in_box(&mut rng, 1.0), size * in_box(&mut rng, 1.0));
+        if i.is_multiple_of(5) {
+            (u.y, v.y) = (0.0, 0.0);
+        }
+        if i.is_multiple_of(7) {
+            v = u + 1e-4 * v;
+        }
+        [corner, corner + u, corner + v].map(|p| p.as_vec3())
+    };
+    (0..count).map(triangle).collect()
+}
+
+/// Distance at which a ray meets a triangle, by Moeller and Trumbore in f64, and how near it passes to an edge.
+fn brute(triangle: &[Vec3; 3], o: DVec3, d: DVec3) -> Option<(f64, f64)> {
+    let [a, b, c] = triangle.map(|p| p.as_dvec3());
+    let (u_edge, v_edge) = (b - a, c - a);
+    let p = d.cross(v_edge);
+    let determinant = u_edge.dot(p);
+    let (to, q) = (o - a, (o - a).cross(u_edge));
+    let (u, v, t) = (to.dot(p) / determinant, d.dot(q) / determinant, v_edge.dot(q) / determinant);
+    let margin = u.min(v).min(1.0 - u - v);
+    (margin >= 0.0 && t > 0.0).then_some((t, margin))
+}
+
+#[test]
+fn closest_hits_are_those_of_brute_force() {
+    let triangles = soup(2000);
+    let geometry = Geometry::new(Mesh::new(&triangles), Vec::new(), Vec::new());
+    let mut rng = generator("rays");
+    let mut met = 0;
+    for _ in 0..5000 {
+        // What the mesh sees is the ray rounded to f32.
+        let origin = in_box(&mut rng, 3.0).as_vec3().as_dvec3();
+        let direction = sphere(rng.uniform2()).as_vec3().as_dvec3();
+        let all = triangles.iter().enumerate().filter_map(|(i, t)| Some((brute(t, origin, direction)?, i)));
+        let nearest = all.min_by(|a, b| a.0.0.total_cmp(&b.0.0));
+        let hit = geometry.closest_hit(&Ray { origin, direction });
+        match (nearest, hit) {
+            (None, None) => {}
+            (Some(((t, _), i)), Some(hit)) => {
+                met += 1;
+                assert_eq!(hit.primitive as usize, i);
+                assert!((hit.distance - t).abs() < 1e-9 * t.max(1.0), "{hit:?} against {t}");
+            }
+            // On an edge the two formulas may round differently.
+            (Some(((_, margin), _)), None) => assert!(margin < 1e-9, "missed a triangle: {margin}"),
+            (None, Some(hit)) => panic!("{hit:?} is not there"),
+        }
+    }
+    assert!(met > 1000, "only {met} rays met anything");
+}
+
+#[test]
+fn segments_are_blocked_as_by_brute_force() {
+    let triangles = soup(2000);
+    let spheres = vec![Sphere { center: DVec3::splat(0.5), radius: 0.4, inward: false }];
+    let planes = vec![Plane::new(DVec3::Y * -1.5, DVec3::Y)];
+    let geometry = Geometry::new(Mesh::new(&triangles), spheres, planes);
+    let mut rng = generator("segments");
+    let mut blocked = 0;
+    for _ in 0..5000 {
+        let (a, b) = (in_box(&mut rng, 2.0).as_vec3(), in_box(&mut rng, 2.0).as_vec3());
+        let (o, d) = (a.as_dvec3(), (b - a).as_dvec3());
+        let by_triangle = triangles.iter().any(|t| brute(t, o, d).is_some_and(|(t, _)| t < 1.0));
+        let by_plane = (a.y + 1.5) * (b.y + 1.5) < 0.0;
+        let steps = (0..=2000).map(|i| (o + d * f64::from(i) / 2000.0 - DVec3::splat(0.5)).length() < 0.4);
+        let inside: Vec<bool> = steps.collect();
+        let by_sphere = inside.iter().any(|&x| x != inside[0]);
+        let expected = !(by_triangle || by_plane || by_sphere);
+        blocked += u32::from(!expected);
+        // A chord shorter than a step of the scan may be missed by it, never the other way round.
+        let visible = geometry.visible(a, b);
+        assert!(visible == expected || !visible, "{a} {b}: visible, but something is between them");
+        assert!(visible == expected || (o - DVec3::splat(0.5)).length() > 0.39, "{a} {b}: blocked by nothing");
+    }
+    assert!((1000..4900).contains(&blocked), "{blocked} of 5000 blocked");
+}
+
+/// A closed surface of many triangles: an octahedron's faces divided `depth` times, pushed out to a bumpy sphere.
+fn bumpy_sphere(depth: u32) -> Vec<[Vec3; 3]> {
+    let axes = [DVec3::X, DVec3::Y, DVec3::NEG_X, DVec3::NEG_Y];
+    let mut faces: Vec<[DVec3; 3]> = Vec::new();
+    for i in 0..4 {
+        let (a, b) = (axes[i], axes[(i + 1) % 4]);
+        faces.extend([[a, b, DVec3::Z], [b, a, DVec3::NEG_Z]]);
+    }
+    for _ in 0..depth {
+        let split = |[a, b, c]: [DVec3; 3]| {
+            let (x, y, z) = ((a + b).normalize(), (b + c).normalize(), (c + a).normalize());
+            [[a, x, z], [x, b, y], [z, y, c], [x, y, z]]
+        };
+        faces = faces.into_iter().flat_map(split).collect();
+    }
+    let push = |p: DVec3| (p * (1.0 + 0.2 * p.x * p.y + 0.1 * p.z * p.z)).as_vec3();
+    faces.into_iter().map(|f| f.map(push)).collect()
+}
+
+#[test]
+fn nothing_leaves_closed_surfaces() {
+    let mut room = Model::default();
+    let (x, y, z) = (DVec3::X * 6.0, DVec3::Y * 3.0, DVec3::Z * 4.0);
+    for (origin, u, v) in
+        [(DVec3::ZERO, y, z), (x, z, y), (DVec3::ZERO, z, x), (y, x, z), (DVec3::ZERO, x, y), (z, y, x)]
+    {
+        add_quad(&mut room, origin, u, v, lambert(0.5, 0.0));
+    }
+    let corner = |&v: &u32| room.positions[v as usize] - DVec3::new(3.0, 1.5, 2.0);
+    let room: Vec<[Vec3; 3]> =
+        room.triangles.iter().map(|t| [corner(&t[0]), corner(&t[1]), corner(&t[2])].map(|p| p.as_vec3())).collect();
+    for (name, triangles) in [("room", room), ("bumpy", bumpy_sphere(5))] {
+        let geometry = Geometry::new(Mesh::new(&triangles), Vec::new(), Vec::new());
+        let mut rng = generator(name);
+        for i in 0..300_000 {
+            let origin = in_box(&mut rng, 0.3);
+            // Every other ray aims exactly at an edge or a corner, where neighbours meet.
+            let [a, b, c] = triangles[rng.below(triangles.len() as u32) as usize].map(|p| p.as_dvec3());
+            let target = match i % 4 {
+                0 => a,
+                1 => a + (b - a) * rng.uniform(),
+                _ => a + ((b - a) + (c - a)) * (0.5 * rng.uniform()),
+            };
+            let direction = (target - origin).normalize();
+            let hit = geometry.closest_hit(&Ray { origin, direction });
+            assert!(hit.is_some(), "{name}: ray {i} leaves towards {target}");
+            let beyond = (origin + 1.5 * (target - origin)).as_vec3();
+            assert!(!geometry.visible(origin.as_vec3(), beyond), "{name}: segment {i} leaves towards {target}");
+        }
+    }
+}
+
+#[test]
+fn equal_distances_go_to_the_lower_number() {
+    let twice = [[Vec3::ZERO, Vec3::Z, Vec3::X], [Vec3::ZERO, Vec3::Z, Vec3::X]];
+    let filler = soup(50).into_iter().map(|t| t.map(|p| p - 100.0 * Vec3::Y));
+    let triangles: Vec<_> = filler.chain(twice).collect();
+    let geometry = Geometry::new(Mesh::new(&triangles), Vec::new(), Vec::new());
+    let ray = Ray { origin: DVec3::new(0.2, 1.0, 0.2), direction: DVec3::NEG_Y };
+    let Hit { primitive, front, .. } = geometry.closest_hit(&ray).unwrap();
+    assert_eq!((primitive, front), (50, true));
+}
