@@ -31,7 +31,7 @@ pub enum Command {
         #[arg(short, long, value_name = "DIR")]
         output: Option<PathBuf>,
         /// Worker processes [default: the cores, fewer if memory is short].
-        #[arg(short, long, value_name = "WORKERS", value_parser = positive)]
+        #[arg(short, long, value_name = "WORKERS", value_parser = crew)]
         workers: Option<usize>,
         /// No progress.
         #[arg(short, long)]
@@ -57,7 +57,7 @@ pub enum Command {
         #[arg(long, value_name = "K", env = "SLURM_ARRAY_TASK_ID")]
         shard: u64,
         /// Threads [default: the cores].
-        #[arg(long, value_name = "N", value_parser = positive)]
+        #[arg(long, value_name = "N", value_parser = crew)]
         threads: Option<usize>,
         /// Process whose end ends this worker, too.
         #[arg(long, value_name = "PID", hide = true)]
@@ -84,11 +84,11 @@ pub enum Command {
     },
 }
 
-/// A count that cannot be zero.
-fn positive(text: &str) -> Result<usize, String> {
+/// A count of processes or threads: not zero, and not so many that they only hinder each other.
+fn crew(text: &str) -> Result<usize, String> {
     match text.parse() {
-        Ok(n) if (1..=65536).contains(&n) => Ok(n),
-        _ => Err("allowed: 1 .. 65536".to_owned()),
+        Ok(n) if (1..=1024).contains(&n) => Ok(n),
+        _ => Err("allowed: 1 .. 1024".to_owned()),
     }
 }
 

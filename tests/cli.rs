@@ -164,7 +164,7 @@ fn wrong_usage_is_exit_code_2() {
         (&[], "Usage"),
         (&["render", "job.toml"], "unrecognized subcommand 'render'"),
         (&["run"], "<JOB>"),
-        (&["run", "job.toml", "-w", "0"], "allowed: 1 .. 65536"),
+        (&["run", "job.toml", "-w", "0"], "allowed: 1 .. 1024"),
         (&["run", "job.toml", "--seed", "3"], "unexpected argument '--seed'"),
         (&["work", "out"], "--shard <K>"),
         (&["work", "out", "--shard", "-1"], "unexpected argument '-1'"),
