@@ -101,7 +101,7 @@ fn bad_values_in_a_job_are_named_with_field_value_and_range() {
         ("height = 3", "height = 3\npixel_samples = 3", "camera[0].pixel_samples = 3: 1, 4, 9 or 16"),
         ("vertical_fov_degrees = 40.0", "vertical_fov_degrees = 180", "camera[0].vertical_fov_degrees = 180: between"),
         ("vertical_fov_degrees = 40.0", "", "camera[0] = (incomplete): either node, or all of eye, target"),
-        ("target = [0.0, 1.0, 0.0]", "target = [0.0, 1.0, 3.0]", "camera[0].target minus eye"),
+        ("target = [0.0, 1.0, 0.0]", "target = [0.0, 1.0, 3.0]", "at least 1e-6 m from the eye"),
         (
             "vertical_fov_degrees = 40.0",
             "vertical_fov_degrees = 40\nup = [0, 0, 1]",

@@ -65,7 +65,8 @@ fn closest_hits_are_those_of_brute_force() {
             (Some(((t, _), i)), Some(hit)) => {
                 met += 1;
                 assert_eq!(hit.primitive as usize, i);
-                assert!((hit.distance - t).abs() < 1e-9 * t.max(1.0), "{hit:?} against {t}");
+                // A ray from outside is taken to the mesh before it is rounded to f32.
+                assert!((hit.distance - t).abs() < 1e-6 * t.max(1.0), "{hit:?} against {t}");
             }
             // On an edge the two formulas may round differently.
             (Some(((_, margin), _)), None) => assert!(margin < 1e-9, "missed a triangle: {margin}"),

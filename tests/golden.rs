@@ -13,7 +13,7 @@ use std::process::Command;
 const GOLDEN: (u32, &str, &str) = (
     1,
     "2bd2927ee219cbd533074da8771c1c8cfda51edc31bfa1a4188f10f3b772b332",
-    "09507440ba0ad8acea622248e368121921af85f3198e9de9e48466672274f373",
+    "e125ee4f62640bb0352c5abacbb93deb6601d18521712e668cd86fd82b41c5ed",
 );
 
 #[test]

@@ -171,6 +171,10 @@ fn check_plan(plan: &Plan, path: &Path) -> Result<()> {
         return Err(Error::refused(path, "edited or damaged: its digest is not that of its content"));
     }
     // The fields outside the digest are checked as those of a job file are.
+    if plan.name.chars().any(char::is_control) {
+        return Err(Error::refused(path, "edited or damaged: the name of the job has control characters"));
+    }
+    plan.check_sizes()?;
     let job = toml::to_string(&plan.job).map_err(|e| Error::refused(path, e))?;
     Job::parse(&job, &path.display().to_string()).map(|_| ())
 }

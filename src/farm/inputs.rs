@@ -38,6 +38,7 @@ pub fn prepare(path: &Path) -> Result<Prepared> {
     let job_file = Input::of(&file_name(path), text.as_bytes());
     let inputs = files.iter().map(|(input, _): &(Input, Vec<u8>)| input.clone()).collect();
     let mut summary = summary(&scene);
+    summary.warnings.extend(lift_warning(&scene));
     summary.warnings.extend(ReceiverSet::check(&job, &scene, &file)?);
     let plan = Plan::new(&name, job, job_file.clone(), inputs, summary)?;
     files.push((job_file, text.into_bytes()));
@@ -87,6 +88,17 @@ fn read_beside(path: &Path, scene: &str, uri: &str) -> Result<Vec<u8>> {
     }
     let beside = path.parent().unwrap_or(Path::new("")).join(uri);
     fs::read(&beside).map_err(|e| refused(format!("a file that can be read ({e})")))
+}
+
+/// A warning where the scene is so large that f32 coordinates blur what stands in it.
+fn lift_warning(scene: &Scene) -> Option<String> {
+    let millimetres = 1e3 * scene.geometry.lift_length();
+    (millimetres > 1.0).then(|| {
+        format!(
+            "the scene is so large that its points are lifted {millimetres:.1} mm off their surfaces: receivers see \
+             through anything thinner or nearer than that; leave out far geometry"
+        )
+    })
 }
 
 fn summary(scene: &Scene) -> SceneSummary {

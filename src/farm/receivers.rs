@@ -22,6 +22,8 @@ pub struct ReceiverSet {
     bins: Bins,
     stream: Stream,
     histories: u64,
+    /// Where each bin lies, of a surface point seen from all directions; empty for others.
+    sights: Vec<Sight>,
 }
 
 /// What the bins are.
@@ -31,6 +33,20 @@ enum Bins {
     /// Lux-meters; `None` inside a solid.
     Meters(Vec<Option<Receiver>>),
 }
+
+/// Where a bin of directions lies that leave a surface point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Sight {
+    Above,
+    /// Across the horizon: its mean is the mean over what lies above.
+    Across,
+    Below,
+}
+
+/// Positions along each side of a bin at which it is looked whether it lies above the horizon.
+const PROBES: u32 = 33;
+/// Draws after which a bin across the horizon is taken to show nothing of what lies above.
+const DRAWS: u32 = 1 << 16;
 
 /// What the positions of one bin say in one batch.
 struct Sensed {
@@ -75,7 +91,23 @@ impl ReceiverSet {
     fn new(job: &Job, shape: SetShape, bins: Bins) -> Self {
         let stream = Stream::new(job.run.seed, Domain::Receiver, &shape.name);
         let histories = job.run.histories_per_batch;
-        ReceiverSet { shape, bins, stream, histories }
+        let mut set = ReceiverSet { shape, bins, stream, histories, sights: Vec::new() };
+        if let Bins::Film { eye: eye @ Eye::Surface { .. }, .. } = &set.bins {
+            set.sights = (0..set.shape.bins()).map(|i| set.probe(eye, i)).collect();
+        }
+        set
+    }
+
+    /// Looks where bin `i` of the directions that leave a surface point lies.
+    fn probe(&self, eye: &Eye, i: usize) -> Sight {
+        let side = |k: u32| f64::from(k) / f64::from(PROBES - 1);
+        let places = (0..PROBES).flat_map(|x| (0..PROBES).map(move |y| DVec2::new(side(x), side(y))));
+        let above = places.filter(|&p| !matches!(eye.gaze(self.film(i, 1, 0, p)), Gaze::Nowhere)).count() as u32;
+        match above {
+            0 => Sight::Below,
+            all if all == PROBES * PROBES => Sight::Above,
+            _ => Sight::Across,
+        }
     }
 
     /// Name, size and keeping.
@@ -134,7 +166,7 @@ impl ReceiverSet {
     pub fn fixed_direct(&self, scene: &Scene, i: usize) -> f64 {
         match &self.bins {
             Bins::Meters(meters) => meters[i].map_or(f64::NAN, |r| from_lights(scene, &r).luminance()),
-            Bins::Film { .. } if self.is_below_horizon(i) => f64::NAN,
+            Bins::Film { .. } if self.sights.get(i) == Some(&Sight::Below) => f64::NAN,
             Bins::Film { .. } => 0.0,
         }
     }
@@ -142,13 +174,6 @@ impl ReceiverSet {
     /// True when direct light is zero and the same in every batch for all bins, so that none need be kept.
     pub fn has_no_fixed_direct(&self) -> bool {
         matches!(&self.bins, Bins::Film { eye: Eye::Camera { .. } | Eye::Sphere { .. }, .. })
-    }
-
-    /// True when all corners of the bin look from below a surface point.
-    fn is_below_horizon(&self, i: usize) -> bool {
-        let Bins::Film { eye: eye @ Eye::Surface { .. }, .. } = &self.bins else { return false };
-        let corners = [(0.0, 0.0), (0.0, 1.0), (1.0, 0.0), (1.0, 1.0), (0.5, 0.5)];
-        corners.iter().all(|&(x, y)| matches!(eye.gaze(self.film(i, 1, 0, DVec2::new(x, y))), Gaze::Nowhere))
     }
 
     /// Film position, in the unit square, at the place `within` the stratum number `stratum` of the
@@ -166,6 +191,21 @@ impl ReceiverSet {
             _ => (row + v) / height,
         };
         DVec2::new(x, y)
+    }
+
+    /// A film position of bin `bin`: in its stratum, or across the horizon anywhere in the bin, but above.
+    fn draw(&self, eye: &Eye, strata: u32, stratum: u32, bin: usize, rng: &mut Generator) -> DVec2 {
+        if self.sights.get(bin) != Some(&Sight::Across) {
+            return self.film(bin, strata, stratum, rng.uniform2());
+        }
+        let mut film = self.film(bin, 1, 0, rng.uniform2());
+        for _ in 0..DRAWS {
+            if !matches!(eye.gaze(film), Gaze::Nowhere) {
+                break;
+            }
+            film = self.film(bin, 1, 0, rng.uniform2());
+        }
+        film
     }
 
     /// Scores the bins of one tile against all histories of a batch.
@@ -212,7 +252,7 @@ impl ReceiverSet {
         let carrying = rng.below(positions);
         let mut sensed = Sensed { direct: Colour::BLACK, receiver: None, existed: false };
         for stratum in 0..positions {
-            let film = self.film(bin, strata, stratum, rng.uniform2());
+            let film = self.draw(eye, strata, stratum, bin, rng);
             let seen = gaze(scene, eye, film, rng);
             sensed.direct += seen.emitted;
             if let Some(receiver) = &seen.receiver {

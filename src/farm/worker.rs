@@ -62,9 +62,13 @@ pub fn work(order: &Order) -> Result<Ended> {
         let allowed = format!("0 .. {}", plan.shard_count() - 1);
         return Err(Error::input("command line", "--shard", order.shard, allowed));
     }
+    let work = Work::resume(&order.folder, &plan, order.shard)?;
+    if work.missing() == 0 {
+        return Ok(Ended::Done);
+    }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(order.threads.unwrap_or(0)).build();
     let pool = pool.map_err(|e| Error::Failed(format!("cannot start threads: {e}")))?;
-    pool.install(|| Work::resume(&order.folder, &plan, order.shard)?.finish(&order.folder, &stop))
+    pool.install(|| work.finish(&order.folder, &stop))
 }
 
 /// A flag that SIGTERM and SIGINT set.
@@ -124,9 +128,6 @@ impl<'a> Work<'a> {
     }
 
     fn finish(mut self, folder: &Folder, stop: &AtomicBool) -> Result<Ended> {
-        if self.missing() == 0 {
-            return Ok(Ended::Done);
-        }
         let scene = inputs::load_scene(folder, self.plan)?;
         let realization = Realization::new(&self.plan.job, &scene);
         let fixed = realization.fixed_direct();

@@ -21,6 +21,8 @@ pub struct Mesh {
     place: Vec<u32>,
     bvh: Bvh2,
     bounds: (DVec3, DVec3),
+    /// The bounds and a little around them, where rays may start.
+    near: (DVec3, DVec3),
 }
 
 /// A triangle as rays meet it: (normal, x) = offset on its plane.
@@ -51,7 +53,9 @@ impl Mesh {
             place[primitive as usize] = at as u32;
         }
         let ordered = bvh.primitive_indices.iter().map(|&p| Triangle::new(triangles[p as usize], p));
-        Mesh { triangles: ordered.collect(), place, bvh, bounds }
+        let around = 0.01 * (bounds.1 - bounds.0).max_element();
+        let near = (bounds.0 - around, bounds.1 + around);
+        Mesh { triangles: ordered.collect(), place, bvh, bounds, near }
     }
 
     /// Number of triangles.
@@ -78,7 +82,35 @@ impl Mesh {
         self.triangles[self.place[primitive as usize] as usize].corners.map(|p| p.as_dvec3())
     }
 
+    /// Parameters at which the line o + t d, t in 0 ..= `end`, enters and leaves the mesh; `None` when it misses it.
+    ///
+    /// Beyond the mesh f32 rounds more than the boxes of the hierarchy are inflated by, so no ray starts there.
+    fn clip(&self, o: DVec3, d: DVec3, end: f64) -> Option<(f64, f64)> {
+        let (low, high) = self.near;
+        let (mut enter, mut leave) = (0.0f64, end);
+        for axis in 0..3 {
+            let (a, b) = ((low[axis] - o[axis]) / d[axis], (high[axis] - o[axis]) / d[axis]);
+            // 0/0 on a face of the box is NaN, which min and max pass over.
+            enter = enter.max(a.min(b));
+            leave = leave.min(a.max(b));
+        }
+        (enter <= leave).then_some((enter, leave))
+    }
+
+    fn is_near(&self, p: DVec3) -> bool {
+        p.cmpge(self.near.0).all() && p.cmple(self.near.1).all()
+    }
+
     pub(super) fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+        if self.is_near(ray.origin) {
+            return self.closest_hit_near(ray);
+        }
+        let (enter, _) = self.clip(ray.origin, ray.direction, f64::INFINITY)?;
+        let hit = self.closest_hit_near(&Ray { origin: ray.origin + enter * ray.direction, ..*ray })?;
+        Some(Hit { distance: hit.distance + enter, ..hit })
+    }
+
+    fn closest_hit_near(&self, ray: &Ray) -> Option<Hit> {
         // Boxes and triangles must see the same ray, or a ray could pass between a box and its triangle.
         let (origin, direction) = (ray.origin.as_vec3a(), ray.direction.as_vec3a());
         let (o, d) = (origin.as_dvec3(), direction.as_dvec3());
@@ -105,6 +137,17 @@ impl Mesh {
 
     /// True when a triangle crosses the segment from `a` to `b`, ends excluded.
     pub(super) fn blocks(&self, a: Vec3, b: Vec3) -> bool {
+        let (o, end) = (a.as_dvec3(), b.as_dvec3());
+        if self.is_near(o) && self.is_near(end) {
+            return self.blocks_near(a, b);
+        }
+        let clipped = self.clip(o, end - o, 1.0);
+        clipped.is_some_and(|(enter, leave)| {
+            self.blocks_near((o + enter * (end - o)).as_vec3(), (o + leave * (end - o)).as_vec3())
+        })
+    }
+
+    fn blocks_near(&self, a: Vec3, b: Vec3) -> bool {
         let (o, d) = (a.as_dvec3(), (b - a).as_dvec3());
         let box_ray = BoxRay::new(a.into(), (b - a).into(), 0.0, 1.0);
         !self.bvh.ray_traverse_miss(box_ray, |_, at| match self.triangles[at].intersect(o, d, 1.0) {

@@ -113,6 +113,11 @@ impl Geometry {
         best
     }
 
+    /// How far points of bounded geometry are lifted \[m\]: thinner things cannot cast a shadow on what touches them.
+    pub fn lift_length(&self) -> f64 {
+        LIFT * self.extent
+    }
+
     /// The point `position` lifted off the surface along `normal`, as the start of rays and segments \[m\].
     pub fn lift(&self, position: DVec3, normal: DVec3) -> DVec3 {
         position + normal * (LIFT * self.extent.max(position.abs().max_element()))

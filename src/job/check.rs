@@ -34,7 +34,7 @@ pub(super) fn check(job: &Job, file: &str) -> Result<()> {
 fn check_run(c: &Checker, job: &Job) -> Result<()> {
     let run = &job.run;
     c.that("run.seed", run.seed, run.seed < 1 << 63, "0 .. 9223372036854775807")?;
-    c.range("run.histories_per_batch", run.histories_per_batch, 1, 1 << 24)?;
+    c.range("run.histories_per_batch", run.histories_per_batch, 1, 1 << 20)?;
     c.range("run.batches", run.batches, 1, 1 << 32)?;
     c.range("run.batches_per_shard", run.batches_per_shard, 1, 1 << 20)?;
     c.that(
@@ -85,7 +85,7 @@ fn check_camera(c: &Checker, at: &str, camera: &Camera, has_scene: bool) -> Resu
     c.position(&format!("{at}.target"), view.target)?;
     c.direction(&format!("{at}.up"), view.up)?;
     let forward: [f64; 3] = std::array::from_fn(|i| view.target[i] - view.eye[i]);
-    c.direction(&format!("{at}.target minus eye"), forward)?;
+    c.that(&format!("{at}.target"), Shown(view.target), length(forward) >= 1e-6, "at least 1e-6 m from the eye")?;
     let across = cross(forward, view.up);
     let scale = length(forward) * length(view.up);
     c.that(&format!("{at}.up"), Shown(view.up), length(across) > 1e-6 * scale, "not parallel to the line of sight")?;

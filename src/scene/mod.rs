@@ -17,6 +17,9 @@ use crate::job::{self, Channels, Job};
 use crate::math::DVec3;
 use crate::photometry::Colour;
 
+/// Largest luminous flux of a scene \[lm\]: the Sun on a country, and far from what f32 can hold.
+const MAX_FLUX: f64 = 1e15;
+
 /// A material: how a surface reflects and what it emits.
 #[derive(Clone, Debug)]
 pub struct Surface {
@@ -88,7 +91,7 @@ impl Scene {
     /// # Errors
     /// [`Error::Input`] for a scene without light, or parallel light over infinite planes.
     pub fn new(model: Model, job: &Job) -> Result<Scene> {
-        let offset = -middle(&model.positions);
+        let offset = -middle(&model.positions, &job.spheres);
         let paint = |c: Colour| match job.run.channels {
             Channels::Luminance => Colour::grey(c.luminance()),
             Channels::Rgb => c,
@@ -110,6 +113,11 @@ impl Scene {
         let sources = Sources::new(lights, emitters, geometry.bounding_sphere());
         if sources.is_empty() {
             return Err(Error::input("scene", "sources", "none", "at least one light or emissive surface"));
+        }
+        let flux = sources.flux();
+        if flux.is_nan() || flux > MAX_FLUX {
+            let allowed = format!("at most {MAX_FLUX:e} lm from all sources together");
+            return Err(Error::input("scene", "luminous flux", flux, allowed));
         }
         let cameras = model.cameras.into_iter().map(|c| CameraNode { eye: c.eye + offset, ..c }).collect();
         Ok(Scene { geometry, sources, cameras, warnings: model.warnings, offset, surfaces, surface_of })
@@ -147,11 +155,12 @@ impl Scene {
     }
 }
 
-/// Middle of the box around `positions`; the origin without any.
-fn middle(positions: &[DVec3]) -> DVec3 {
+/// Middle of the box around all bounded geometry; the origin without any.
+fn middle(positions: &[DVec3], spheres: &[job::Sphere]) -> DVec3 {
+    let poles = spheres.iter().flat_map(|s| [DVec3::from(s.center) - s.radius, DVec3::from(s.center) + s.radius]);
     let empty = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    let (low, high) = positions.iter().fold(empty, |(low, high), &p| (low.min(p), high.max(p)));
-    if positions.is_empty() { DVec3::ZERO } else { 0.5 * (low + high) }
+    let (low, high) = positions.iter().copied().chain(poles).fold(empty, |(low, high), p| (low.min(p), high.max(p)));
+    if low.x <= high.x { 0.5 * (low + high) } else { DVec3::ZERO }
 }
 
 fn painted(surface: Surface, channels: Channels) -> Surface {

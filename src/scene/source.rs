@@ -180,8 +180,10 @@ pub struct Sources {
     pub lights: Vec<Light>,
     /// Emissive triangles.
     pub emitters: Vec<Emitter>,
-    /// Running sum of luminous flux over lights, then emitters \[lm\].
-    cumulative: Vec<f64>,
+    /// Running sum of luminous flux over the lights \[lm\].
+    light_flux: Vec<f64>,
+    /// The same over the emitters, from zero: beside a lamp of 10^12 lm a panel of 1 lm keeps its digits.
+    emitter_flux: Vec<f64>,
     /// Centre and radius of the sphere that parallel light must cover \[m\].
     covered: (DVec3, f64),
 }
@@ -192,62 +194,41 @@ impl Sources {
         let lit = |flux: Colour| flux.luminance() > 0.0;
         let lights: Vec<Light> = lights.into_iter().filter(|l| lit(l.flux(covered.1))).collect();
         let emitters: Vec<Emitter> = emitters.into_iter().filter(|e| lit(e.flux())).collect();
-        let fluxes = lights.iter().map(|l| l.flux(covered.1)).chain(emitters.iter().map(Emitter::flux));
-        let cumulative = fluxes
-            .scan(0.0, |sum, flux| {
-                *sum += flux.luminance();
-                Some(*sum)
-            })
-            .collect();
-        Sources { lights, emitters, cumulative, covered }
+        let light_flux = running_sum(lights.iter().map(|l| l.flux(covered.1)));
+        let emitter_flux = running_sum(emitters.iter().map(Emitter::flux));
+        Sources { lights, emitters, light_flux, emitter_flux, covered }
     }
 
     /// Number of sources.
     pub fn len(&self) -> usize {
-        self.cumulative.len()
+        self.lights.len() + self.emitters.len()
     }
 
     /// True in the dark.
     pub fn is_empty(&self) -> bool {
-        self.cumulative.is_empty()
+        self.len() == 0
     }
 
     /// Luminous flux of all sources \[lm\].
     pub fn flux(&self) -> f64 {
-        self.cumulative.last().copied().unwrap_or(0.0)
-    }
-
-    /// Luminous flux of all emitters \[lm\].
-    fn emitter_flux(&self) -> f64 {
-        self.flux() - self.flux_before_emitters()
-    }
-
-    fn flux_before_emitters(&self) -> f64 {
-        if self.lights.is_empty() { 0.0 } else { self.cumulative[self.lights.len() - 1] }
+        last(&self.light_flux) + last(&self.emitter_flux)
     }
 
     /// Chooses an emitter in proportion to flux by `u` in [0, 1): the emitter and its probability.
     pub fn choose_emitter(&self, u: f64) -> (&Emitter, f64) {
-        let first = self.lights.len();
-        let target = self.flux_before_emitters() + u * self.emitter_flux();
-        let chosen = self.cumulative[first..].partition_point(|&sum| sum <= target).min(self.emitters.len() - 1);
-        let emitter = &self.emitters[chosen];
-        (emitter, emitter.flux().luminance() / self.emitter_flux())
+        let all = last(&self.emitter_flux);
+        let emitter = &self.emitters[choose(&self.emitter_flux, u * all)];
+        (emitter, emitter.flux().luminance() / all)
     }
 
     /// Starts a history. With a single source no number is drawn for the choice.
     pub fn emit(&self, geometry: &Geometry, rng: &mut Generator) -> Emission {
-        let last = self.len() - 1;
-        let chosen = match last {
-            0 => 0,
-            _ => {
-                let target = rng.uniform() * self.flux();
-                self.cumulative.partition_point(|&sum| sum <= target).min(last)
-            }
-        };
-        let (origin, direction, flux) = match self.lights.get(chosen) {
-            Some(light) => self.emit_light(light, rng),
-            None => emit_triangle(&self.emitters[chosen - self.lights.len()], geometry, rng),
+        let target = if self.len() == 1 { 0.0 } else { rng.uniform() * self.flux() };
+        let of_lights = last(&self.light_flux);
+        let (origin, direction, flux) = if target < of_lights || self.emitters.is_empty() {
+            self.emit_light(&self.lights[choose(&self.light_flux, target)], rng)
+        } else {
+            emit_triangle(&self.emitters[choose(&self.emitter_flux, target - of_lights)], geometry, rng)
         };
         // flux over the probability of the choice: the colour of the source, the luminous flux of all.
         Emission { origin, direction, weight: flux * (self.flux() / flux.luminance()) }
@@ -270,6 +251,23 @@ impl Sources {
         };
         (origin, direction, light.flux(radius))
     }
+}
+
+fn running_sum(fluxes: impl Iterator<Item = Colour>) -> Vec<f64> {
+    let add = |sum: &mut f64, flux: Colour| {
+        *sum += flux.luminance();
+        Some(*sum)
+    };
+    fluxes.scan(0.0, add).collect()
+}
+
+fn last(sums: &[f64]) -> f64 {
+    sums.last().copied().unwrap_or(0.0)
+}
+
+/// Index of the source in whose share of the running sum `target` lies.
+fn choose(sums: &[f64], target: f64) -> usize {
+    sums.partition_point(|&sum| sum <= target).min(sums.len() - 1)
 }
 
 fn emit_triangle(emitter: &Emitter, geometry: &Geometry, rng: &mut Generator) -> (DVec3, DVec3, Colour) {

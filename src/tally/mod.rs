@@ -26,7 +26,7 @@ pub struct Scores {
     pub direct: Vec<f64>,
     /// R, G, B of `value`; empty where the set keeps no colour.
     pub colour: Vec<[f64; 3]>,
-    /// R, G, B of `direct` are not kept; the largest total of a single history, direct light excluded.
+    /// The largest total of a single history, direct light left out.
     pub peak: Vec<f64>,
     /// Whether the receiver of the bin existed: a surface that reflects was hit.
     pub existed: Vec<bool>,

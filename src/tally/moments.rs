@@ -110,11 +110,11 @@ impl MomentBlock {
         }
     }
 
-    /// The estimate of bin `i` over `n` batches. A bin whose receiver existed and never scored has no information:
-    /// its error is NaN, never 0.
+    /// The estimate of bin `i` over `n` batches. A bin whose receiver existed but that no history ever reached has no
+    /// information about reflected light, whatever its direct part says: its error is NaN, never 0.
     pub fn estimate(&self, i: usize, n: u64) -> Estimate {
         let mut estimate = Estimate::from_moments(n, self.mean[i], self.m2[i]);
-        if self.existed[i] > 0 && self.mean[i] == 0.0 && self.m2[i] == 0.0 {
+        if self.existed[i] > 0 && self.peak[i] == 0.0 {
             estimate.standard_error = f64::NAN;
         }
         estimate

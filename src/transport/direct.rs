@@ -5,7 +5,7 @@
 
 use super::receiver::Receiver;
 use super::spherical_triangle::SphericalTriangle;
-use crate::math::{DVec3, Vec3};
+use crate::math::DVec3;
 use crate::photometry::Colour;
 use crate::random::Generator;
 use crate::scene::{Emitter, Scene};
@@ -46,7 +46,8 @@ pub fn from_emitters(scene: &Scene, receiver: &Receiver, samples: u64, rng: &mut
     if scene.sources.emitters.is_empty() {
         return Colour::BLACK;
     }
-    let lifted = scene.geometry.lift(receiver.position, receiver.normal).as_vec3();
+    // Sampled as seen from the lifted point, where visibility starts: both must agree on which side of an emitter it is.
+    let lifted = scene.geometry.lift(receiver.position, receiver.normal);
     let mut sum = Colour::BLACK;
     for k in 0..samples {
         let stratum = (k as f64 + rng.uniform()) / samples as f64;
@@ -57,19 +58,19 @@ pub fn from_emitters(scene: &Scene, receiver: &Receiver, samples: u64, rng: &mut
 }
 
 /// One sample of the light from `emitter`.
-fn sample_emitter(scene: &Scene, receiver: &Receiver, lifted: Vec3, emitter: &Emitter, rng: &mut Generator) -> Colour {
-    let side = emitter.normal.dot(receiver.position - emitter.corners[0]);
+fn sample_emitter(scene: &Scene, receiver: &Receiver, from: DVec3, emitter: &Emitter, rng: &mut Generator) -> Colour {
+    let side = emitter.normal.dot(from - emitter.corners[0]);
     if side == 0.0 || (side < 0.0 && !emitter.double_sided) {
         return Colour::BLACK;
     }
     let normal = emitter.normal * side.signum();
-    let Some((point, solid_angle)) = sample_point(receiver.position, emitter, normal, rng) else {
+    let Some((point, solid_angle)) = sample_point(from, emitter, normal, rng) else {
         return Colour::BLACK;
     };
-    let w_in = (receiver.position - point).normalize();
+    let w_in = (from - point).normalize();
     let cosine = -receiver.normal.dot(w_in);
     let target = scene.geometry.lift(point, normal).as_vec3();
-    if cosine <= 0.0 || !scene.geometry.visible(lifted, target) {
+    if cosine <= 0.0 || !scene.geometry.visible(from.as_vec3(), target) {
         return Colour::BLACK;
     }
     emitter.luminance * (cosine * solid_angle) * receiver.response.to(scene, receiver.normal, w_in)

@@ -58,6 +58,7 @@ pub fn run(folder: &Folder, plan: &Plan, options: Options) -> Result<Ended> {
     if waiting.is_empty() {
         return Ok(Ended::WasDone);
     }
+    machine::check_memory(plan)?;
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [SIGTERM, SIGINT] {
         signal_hook::flag::register(signal, Arc::clone(&stop))

@@ -62,7 +62,10 @@ impl Plan {
     }
 
     /// Refuses a plan beyond the limits, naming the size and what would help.
-    pub(super) fn check_sizes(&self) -> Result<()> {
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming the size and the limit.
+    pub fn check_sizes(&self) -> Result<()> {
         let file = &self.job_file.name;
         let shards = self.shard_count();
         if shards > MAX_SHARDS {
