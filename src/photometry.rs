@@ -1,4 +1,4 @@
-//! Photometric quantities: what a number means is its type or stands in its name with the unit.
+//! Photometric quantities in three channels or one. What a number means stands in its name, its unit in its doc.
 //!
 //! A [`Colour`] is a triple of linear Rec.709 values of one quantity; in a job with `channels = "luminance"`
 //! the three are equal and only the first is carried through the hot loop.

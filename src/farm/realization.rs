@@ -56,9 +56,7 @@ impl<'a> Realization<'a> {
         let (histories, flux) = self.trace(index);
         let sets = self.sets.par_iter().zip(&self.orders_of_bins);
         let scores = sets.map(|(set, order)| self.score(set, order, index, &histories)).collect();
-        let per_history = 1.0 / self.job.run.histories_per_batch as f64;
-        let flux = [flux.emitted, flux.absorbed, flux.escaped, flux.lost, flux.met_delta].map(|x| x * per_history);
-        BatchScores { sets: scores, flux }
+        BatchScores { sets: scores, flux: flux.scores(1.0 / self.job.run.histories_per_batch as f64) }
     }
 
     /// Traces the histories of a batch and prepares their vertices.

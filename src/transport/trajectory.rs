@@ -48,6 +48,12 @@ pub struct FluxBalance {
 }
 
 impl FluxBalance {
+    /// In the order of the bins of the flux balance, `tally::FLUX_BINS`, each times `share` \[lm\].
+    pub fn scores(&self, share: f64) -> [f64; 5] {
+        let FluxBalance { emitted, absorbed, escaped, lost, met_delta } = *self;
+        [emitted, absorbed, escaped, lost, met_delta].map(|x| x * share)
+    }
+
     /// Adds the balance of another history.
     pub fn add(&mut self, other: &FluxBalance) {
         self.emitted += other.emitted;
