@@ -3,8 +3,7 @@
 //! Of each shard the longest checkpoint counts, once the batch digests show the others to be its prefixes; so
 //! copies count once and the order of the folders changes nothing. Files are read one after the other, a block of
 //! bins at a time, so memory holds the result and one block. A file that cannot be trusted stops the merge and is
-//! named, with the reason; nothing is ever written to a folder of checkpoints. Merging knows neither scene nor
-//! random numbers.
+//! named, with the reason; nothing here writes. Merging knows neither scene nor random numbers.
 
 use super::checkpoint::{Checksum, Header, Reader, block_count, read_header};
 use super::folder::Folder;
