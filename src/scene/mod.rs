@@ -110,7 +110,14 @@ impl Scene {
         let lights = model.lights.into_iter().chain(job.sources.iter().map(light));
         let lights: Vec<Light> = lights.map(|l| l.moved(offset).recoloured(paint)).collect();
         refuse_endless_flux(&geometry, &lights)?;
+        let given = lights.len();
         let sources = Sources::new(lights, emitters, geometry.bounding_sphere());
+        let mut warnings = model.warnings;
+        if sources.lights.len() < given {
+            let dark = given - sources.lights.len();
+            warnings
+                .push(format!("{dark} of {given} lights without flux ignored: dark, no cone, or nothing to shine on"));
+        }
         if sources.is_empty() {
             return Err(Error::input("scene", "sources", "none", "at least one light or emissive surface"));
         }
@@ -120,7 +127,7 @@ impl Scene {
             return Err(Error::input("scene", "luminous flux", flux, allowed));
         }
         let cameras = model.cameras.into_iter().map(|c| CameraNode { eye: c.eye + offset, ..c }).collect();
-        Ok(Scene { geometry, sources, cameras, warnings: model.warnings, offset, surfaces, surface_of })
+        Ok(Scene { geometry, sources, cameras, warnings, offset, surfaces, surface_of })
     }
 
     /// A position of the job in the coordinates of the scene \[m\].
