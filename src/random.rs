@@ -17,6 +17,12 @@ pub enum Domain {
     /// Sub-pixel positions, mirror choices and area-light samples of one receiver set; the index is
     /// `batch * bins + bin`.
     Receiver,
+    /// Trajectories that fix the bound of the kernel before the run; the index is that of the trajectory.
+    Pilot,
+    /// Receiver-side continuations of one receiver set; the index is `batch * bins + bin`.
+    Continuation,
+    /// Scrambling of the quasi-random set of a batch; the index is the batch.
+    Scrambling,
 }
 
 impl Domain {
@@ -24,6 +30,9 @@ impl Domain {
         match self {
             Domain::Trajectory => "lampyris 1 trajectory",
             Domain::Receiver => "lampyris 1 receiver",
+            Domain::Pilot => "lampyris 1 pilot",
+            Domain::Continuation => "lampyris 1 continuation",
+            Domain::Scrambling => "lampyris 1 scrambling",
         }
     }
 }

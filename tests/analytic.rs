@@ -33,7 +33,7 @@ fn assert_exact(name: &str, value: f64, reference: f64) {
 /// Direct light of job and model at the points of the job, without any history.
 fn direct(job: &str, model: Model) -> Vec<f64> {
     let case = Case::new(job, model);
-    let realization = lampyris::farm::realization::Realization::new(&case.job, &case.scene);
+    let realization = lampyris::farm::realization::Realization::new(&case.job, &case.scene, &case.bounds);
     realization.fixed_direct().iter().map(|set| set[0]).collect()
 }
 

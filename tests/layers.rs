@@ -21,7 +21,7 @@ const LAYERS: [&[&str]; 8] = [
 const FARM: [&[&str]; 7] = [
     &["plan", "durable"],
     &["ordering", "receivers"],
-    &["folder", "realization"],
+    &["folder", "realization", "pilot"],
     &["inputs", "checkpoint"],
     &["status"],
     &["worker", "coordinator", "merge"],

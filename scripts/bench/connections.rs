@@ -3,6 +3,7 @@
 //! Receivers are the pixels of a camera, connected to the vertices of one batch, visibility and sums included.
 //! Times are CPU time of the thread, medians of several runs; on a shared machine compare interleaved runs only.
 
+use lampyris::farm::pilot::bounds;
 use lampyris::farm::realization::Realization;
 use lampyris::job::Job;
 use lampyris::random::{Domain, Stream};
@@ -42,7 +43,7 @@ fn bench(name: &str, side: u32) {
         (thread_time() - start).as_secs_f64() / (HISTORIES * 64) as f64
     });
     let per_batch = vertices.len() as f64 / 64.0;
-    let realization = Realization::new(&job, &scene);
+    let realization = Realization::new(&job, &scene, &bounds(&job, &scene));
     let seconds = median(|| {
         let start = thread_time();
         std::hint::black_box(realization.batch(0));

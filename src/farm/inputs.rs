@@ -2,6 +2,7 @@
 //! planned folder becomes the scene again, from the copies it keeps.
 
 use super::folder::Folder;
+use super::pilot::bounds;
 use super::plan::{Input, Plan, SceneSummary};
 use super::receivers::ReceiverSet;
 use crate::error::{Error, Result};
@@ -40,7 +41,8 @@ pub fn prepare(path: &Path) -> Result<Prepared> {
     let mut summary = summary(&scene);
     summary.warnings.extend(lift_warning(&scene));
     summary.warnings.extend(ReceiverSet::check(&job, &scene, &file)?);
-    let plan = Plan::new(&name, job, job_file.clone(), inputs, summary)?;
+    let bounds = bounds(&job, &scene);
+    let plan = Plan::new(&name, job, job_file.clone(), inputs, summary, bounds)?;
     files.push((job_file, text.into_bytes()));
     Ok(Prepared { plan, files })
 }

@@ -8,6 +8,7 @@
 //! inputs        files -> plan, scene
 //! ordering      which bins share tiles
 //! receivers     bins of a job -> receivers in a scene
+//! pilot         the bound of the kernel, fixed before the run
 //! realization   batch index -> scores: the only parallel computation
 //! checkpoint    one durable file for each shard
 //! status        headers -> progress
@@ -23,6 +24,7 @@ pub mod folder;
 pub mod inputs;
 pub mod merge;
 mod ordering;
+pub mod pilot;
 pub mod plan;
 pub mod realization;
 mod receivers;

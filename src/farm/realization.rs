@@ -31,9 +31,9 @@ pub struct Realization<'a> {
 }
 
 impl<'a> Realization<'a> {
-    /// Prepares the receivers of `job` in `scene`, in the current rayon pool.
-    pub fn new(job: &'a Job, scene: &'a Scene) -> Self {
-        let sets = ReceiverSet::all(job, scene);
+    /// Prepares the receivers of `job` in `scene`, in the current rayon pool; `bounds` as in the plan.
+    pub fn new(job: &'a Job, scene: &'a Scene, bounds: &[f64]) -> Self {
+        let sets = ReceiverSet::all(job, scene, bounds);
         let orders_of_bins = sets.iter().map(|s| order_of_bins(s, scene)).collect();
         let fixed_direct = sets.iter().map(|s| fixed_direct(s, scene)).collect();
         let trajectories = Stream::new(job.run.seed, Domain::Trajectory, "");

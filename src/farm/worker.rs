@@ -129,7 +129,7 @@ impl<'a> Work<'a> {
 
     fn finish(mut self, folder: &Folder, stop: &AtomicBool) -> Result<Ended> {
         let scene = inputs::load_scene(folder, self.plan)?;
-        let realization = Realization::new(&self.plan.job, &scene);
+        let realization = Realization::new(&self.plan.job, &scene, &self.plan.bounds);
         let fixed = realization.fixed_direct();
         self.check_fixed_direct(fixed)?;
         let started = Instant::now();

@@ -1,6 +1,6 @@
 //! Every check on what a user typed: each refusal names the field, the value and what is allowed.
 
-use super::{Camera, Gonio, Grid, Job, Roulette, Source};
+use super::{Camera, Estimator, Gonio, Grid, Job, Kept, Ratio, ReceiverKind, Region, Roulette, Source, Stop};
 use crate::error::{Error, Result};
 use std::collections::HashSet;
 use std::fmt::Debug;
@@ -9,6 +9,8 @@ use std::fmt::Debug;
 const MAX_BINS: u64 = 1 << 28;
 /// Largest coordinate \[m\]: beyond it positions in f32 say little.
 const MAX_METRES: f64 = 1e6;
+/// Most bins of one set that are watched history by history.
+const MAX_MONITORED: usize = 1024;
 
 /// Refuses `job` where a value lies outside its range.
 pub(super) fn check(job: &Job, file: &str) -> Result<()> {
@@ -28,7 +30,78 @@ pub(super) fn check(job: &Job, file: &str) -> Result<()> {
     for (i, gonio) in job.gonios.iter().enumerate() {
         check_gonio(&c, &format!("gonio[{i}]"), gonio)?;
     }
+    for (i, region) in job.regions.iter().enumerate() {
+        check_region(&c, &format!("region[{i}]"), region, job)?;
+    }
+    for (i, ratio) in job.ratios.iter().enumerate() {
+        check_ratio(&c, &format!("ratio[{i}]"), ratio, job)?;
+    }
+    if let Some(stop) = &job.stop {
+        check_stop(&c, stop, job)?;
+    }
+    check_estimator(&c, job)?;
     check_surfaces(&c, job)
+}
+
+/// Counting on surface elements needs elements: only the cells of a grid are any.
+fn check_estimator(c: &Checker, job: &Job) -> Result<()> {
+    if job.transport.estimator != Estimator::DirectSimulation {
+        return Ok(());
+    }
+    let others = job.sets().into_iter().find(|s| s.kind != ReceiverKind::Grid);
+    let allowed = "local or reverse: direct_simulation counts on the cells of grids, and knows no other receivers";
+    let name = others.as_ref().map_or("", |s| s.name.as_str());
+    c.that("transport.estimator", format!("direct_simulation (with \"{name}\")"), others.is_none(), allowed)
+}
+
+fn check_stop(c: &Checker, stop: &Stop, job: &Job) -> Result<()> {
+    let (half, share) = (stop.relative_half_width, stop.share);
+    c.that("stop.relative_half_width", half, half > 0.0 && half < 1.0, "between 0 and 1, exclusive")?;
+    c.that("stop.share", share, share > 0.0 && share <= 1.0, "above 0 and at most 1")?;
+    c.range("stop.max_batches", stop.max_batches, 16, 1 << 32)?;
+    let sets = job.sets();
+    let names: Vec<&str> = sets.iter().map(|s| s.name.as_str()).collect();
+    for (i, name) in stop.receivers.iter().enumerate() {
+        let allowed = format!("one of {}", names.join(", "));
+        c.that(&format!("stop.receivers[{i}]"), name, names.contains(&name.as_str()), &allowed)?;
+    }
+    Ok(())
+}
+
+fn check_region(c: &Checker, at: &str, region: &Region, job: &Job) -> Result<()> {
+    let cameras: Vec<&str> = job.cameras.iter().map(|c| c.name.as_str()).collect();
+    let Some(camera) = job.cameras.iter().find(|k| k.name == region.camera) else {
+        let allowed = format!("the name of a [[camera]]: {}", cameras.join(", "));
+        return Err(Error::input(c.file, format!("{at}.camera"), &region.camera, allowed));
+    };
+    match (region.rectangle, &region.node) {
+        (Some([column, row, columns, rows]), None) => {
+            let end = |start: u32, length: u32| u64::from(start) + u64::from(length);
+            let inside = end(column, columns) <= camera.width.into() && end(row, rows) <= camera.height.into();
+            let allowed =
+                format!("column, row, columns, rows of at least one pixel inside {} x {}", camera.width, camera.height);
+            let shown = Shown([column, row, columns, rows]);
+            c.that(&format!("{at}.rectangle"), shown, inside && columns > 0 && rows > 0, &allowed)
+        }
+        (None, Some(node)) => c.that(&format!("{at}.node"), node, job.scene.is_some(), "a node only with a scene"),
+        _ => Err(Error::input(c.file, at, "(both or neither)", "either rectangle or node")),
+    }
+}
+
+fn check_ratio(c: &Checker, at: &str, ratio: &Ratio, job: &Job) -> Result<()> {
+    let kept: Vec<String> = job.sets().into_iter().filter(|s| s.kept == Kept::EveryBatch).map(|s| s.name).collect();
+    let allowed = format!("a grid with keep_batches, a point or a region: {}", kept.join(", "));
+    c.that(&format!("{at}.numerator"), &ratio.numerator, kept.contains(&ratio.numerator), &allowed)?;
+    c.that(&format!("{at}.denominator"), &ratio.denominator, kept.contains(&ratio.denominator), &allowed)
+}
+
+fn check_monitor(c: &Checker, at: &str, monitor: &[[u32; 2]], width: u32, height: u32) -> Result<()> {
+    c.that(&format!("{at}.monitor"), monitor.len(), monitor.len() <= MAX_MONITORED, "at most 1024 bins")?;
+    for (i, &[column, row]) in monitor.iter().enumerate() {
+        let allowed = format!("[column, row] inside {width} x {height}");
+        c.that(&format!("{at}.monitor[{i}]"), Shown([column, row]), column < width && row < height, &allowed)?;
+    }
+    Ok(())
 }
 
 fn check_run(c: &Checker, job: &Job) -> Result<()> {
@@ -71,6 +144,7 @@ fn check_names(c: &Checker, job: &Job) -> Result<()> {
 
 fn check_camera(c: &Checker, at: &str, camera: &Camera, has_scene: bool) -> Result<()> {
     check_size(c, at, [("width", camera.width), ("height", camera.height)], camera.pixel_samples)?;
+    check_monitor(c, at, &camera.monitor, camera.width, camera.height)?;
     let typed = camera.eye.is_some() || camera.target.is_some() || camera.vertical_fov_degrees.is_some();
     if let Some(node) = &camera.node {
         let allowed = "a node, or eye, target and vertical_fov_degrees, not both";
@@ -95,6 +169,7 @@ fn check_camera(c: &Checker, at: &str, camera: &Camera, has_scene: bool) -> Resu
 
 fn check_gonio(c: &Checker, at: &str, gonio: &Gonio) -> Result<()> {
     check_size(c, at, [("width", gonio.width), ("height", gonio.height)], gonio.pixel_samples)?;
+    check_monitor(c, at, &gonio.monitor, gonio.width, gonio.height)?;
     c.position(&format!("{at}.position"), gonio.position)?;
     match (gonio.surface, gonio.normal) {
         (true, Some(normal)) => c.direction(&format!("{at}.normal"), normal),
@@ -106,6 +181,7 @@ fn check_gonio(c: &Checker, at: &str, gonio: &Gonio) -> Result<()> {
 
 fn check_grid(c: &Checker, at: &str, grid: &Grid) -> Result<()> {
     check_size(c, at, [("columns", grid.columns), ("rows", grid.rows)], 1)?;
+    check_monitor(c, at, &grid.monitor, grid.columns, grid.rows)?;
     c.position(&format!("{at}.origin"), grid.origin)?;
     c.position(&format!("{at}.u"), grid.u)?;
     c.position(&format!("{at}.v"), grid.v)?;

@@ -6,7 +6,7 @@
 mod check;
 mod receivers;
 
-pub use receivers::{Camera, Gonio, Grid, Kept, Point, ReceiverKind, SetShape, View};
+pub use receivers::{Camera, Gonio, Grid, Kept, Point, ReceiverKind, Region, SetShape, View};
 
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -37,6 +37,15 @@ pub struct Job {
     /// Spatial-angular luminance distributions.
     #[serde(default, rename = "gonio", skip_serializing_if = "Vec::is_empty")]
     pub gonios: Vec<Gonio>,
+    /// Parts of luminance maps of which the mean luminance is wanted.
+    #[serde(default, rename = "region", skip_serializing_if = "Vec::is_empty")]
+    pub regions: Vec<Region>,
+    /// Ratios of means.
+    #[serde(default, rename = "ratio", skip_serializing_if = "Vec::is_empty")]
+    pub ratios: Vec<Ratio>,
+    /// Precision as the goal.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stop: Option<Stop>,
     /// Infinite one-sided Lambert planes.
     #[serde(default, rename = "plane", skip_serializing_if = "Vec::is_empty")]
     pub planes: Vec<Plane>,
@@ -60,6 +69,8 @@ pub struct Run {
     pub batches: u64,
     /// Shard k holds the batches [k n, k n + n).
     pub batches_per_shard: u64,
+    /// How the histories of a batch are drawn.
+    pub sampling: Sampling,
     /// Confidence of the intervals, between 0 and 1.
     pub confidence: f64,
     /// One photometric channel, or linear Rec.709.
@@ -75,11 +86,22 @@ impl Default for Run {
             histories_per_batch: 64,
             batches: 256,
             batches_per_shard: 32,
+            sampling: Sampling::Random,
             confidence: 0.95,
             channels: Channels::Luminance,
             checkpoint_seconds: 30.0,
         }
     }
+}
+
+/// How the histories of a batch are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Sampling {
+    /// A batch is one Owen-scrambled Sobol set of 2^m histories, scrambled independently of every other batch.
+    Rqmc,
+    /// Independent histories.
+    Random,
 }
 
 /// What a weight is made of.
@@ -92,18 +114,63 @@ pub enum Channels {
     Rgb,
 }
 
-/// `[transport]`: how trajectories end. There is no depth cut.
+/// `[transport]`: what is estimated how, and how trajectories end. There is no depth cut.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Transport {
+    /// The rule that turns histories into numbers.
+    pub estimator: Estimator,
+    /// Bounded kernel with receiver-side continuation; false for the plain local estimate, whose error bars do not
+    /// hold near edges. Of the local estimator only.
+    pub bounded: bool,
     /// Survival probability min(1, W_n / (roulette_below W_1)), or "analog": the reflectance itself.
     pub roulette_below: Roulette,
 }
 
 impl Default for Transport {
     fn default() -> Self {
-        Transport { roulette_below: Roulette::Below(0.05) }
+        Transport { estimator: Estimator::Local, bounded: true, roulette_below: Roulette::Below(0.05) }
     }
+}
+
+/// The rule that turns histories into numbers. All estimate the same quantities.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Estimator {
+    /// Trajectories from the sources, connected to every receiver: the method of this program.
+    Local,
+    /// Paths from the receivers that find the light: a cross-check that shares geometry and reflectance only.
+    Reverse,
+    /// Trajectories counted where they cross the cells of a grid: the illumination map that the paper argues against.
+    DirectSimulation,
+}
+
+/// `[stop]`: the run ends at the first look at which the precision asked for is reached.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Stop {
+    /// Half the width of the interval at `run.confidence` over the mean.
+    pub relative_half_width: f64,
+    /// Names of the receiver sets that must reach it; empty for all.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub receivers: Vec<String>,
+    /// Share of the bins of each set that must reach it, above 0 and at most 1.
+    #[serde(default = "whole")]
+    pub share: f64,
+    /// The most batches of the job: a limit, not a look.
+    pub max_batches: u64,
+}
+
+/// `[[ratio]]`: ratio of two means, with an interval that respects their correlation. Only read from the results.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Ratio {
+    /// Name of the ratio.
+    pub name: String,
+    /// A grid that keeps its batches (its mean), a point or a region.
+    pub numerator: String,
+    /// The same.
+    pub denominator: String,
 }
 
 /// Unbiased Russian roulette.
@@ -199,14 +266,19 @@ impl Job {
         Ok(job)
     }
 
-    /// All receiver sets in the order of the tallies: cameras, gonios, grids, points.
+    /// All receiver sets in the order of the tallies: cameras, gonios, grids, points, regions.
     pub fn sets(&self) -> Vec<SetShape> {
         let cameras = self.cameras.iter().map(|c| c.shape(self.run.channels));
         let gonios = self.gonios.iter().map(|g| g.shape(self.run.channels));
         let grids = self.grids.iter().map(|g| g.shape());
         let points = self.points.iter().map(|p| p.shape());
-        cameras.chain(gonios).chain(grids).chain(points).collect()
+        let regions = self.regions.iter().map(|r| r.shape());
+        cameras.chain(gonios).chain(grids).chain(points).chain(regions).collect()
     }
+}
+
+fn whole() -> f64 {
+    1.0
 }
 
 /// A TOML or type error as an input error: the value is the text of the line where it was found.

@@ -31,6 +31,9 @@ pub struct Camera {
     /// Positions in a pixel and batch: 1, 4, 9 or 16, one in each stratum.
     #[serde(default = "four")]
     pub pixel_samples: u32,
+    /// Bins, as \[column, row\], whose single histories are watched for the health of their intervals.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub monitor: Vec<[u32; 2]>,
 }
 
 /// Where a camera without a node stands.
@@ -67,6 +70,9 @@ pub struct Grid {
     /// Keep every batch's score (variance of the variance, jackknife) or moments only.
     #[serde(default = "yes")]
     pub keep_batches: bool,
+    /// Bins, as \[column, row\], whose single histories are watched for the health of their intervals.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub monitor: Vec<[u32; 2]>,
 }
 
 /// `[[point]]`: one lux-meter.
@@ -102,6 +108,25 @@ pub struct Gonio {
     /// Directions in a texel and batch: 1, 4, 9 or 16, one in each stratum.
     #[serde(default = "four")]
     pub pixel_samples: u32,
+    /// Bins, as \[column, row\], whose single histories are watched for the health of their intervals.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub monitor: Vec<[u32; 2]>,
+}
+
+/// `[[region]]`: mean luminance of a part of a camera's map, one number a batch.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Region {
+    /// Name of the region.
+    pub name: String,
+    /// Name of the camera.
+    pub camera: String,
+    /// First column, first row, columns, rows of a rectangle of pixels; or `node`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rectangle: Option<[u32; 4]>,
+    /// A node of the scene: the pixels in whose centre it, or a node below it, is seen.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub node: Option<String>,
 }
 
 /// What is remembered of the scores of a set.
@@ -127,6 +152,8 @@ pub enum ReceiverKind {
     Grid,
     /// One lux-meter \[lx\].
     Point,
+    /// Mean luminance of a part of a camera's map \[cd/m2\].
+    Region,
 }
 
 /// Name, size and keeping of one receiver set: all that plans, tallies and checkpoints know of it.
@@ -142,9 +169,16 @@ pub struct SetShape {
     pub height: u32,
     /// What is remembered of its scores.
     pub kept: Kept,
+    /// Bins whose single histories are watched, in ascending order.
+    pub monitored: Vec<u32>,
 }
 
 impl SetShape {
+    /// A set of one bin of which every batch is kept.
+    fn single(name: &str, kind: ReceiverKind, monitored: Vec<u32>) -> Self {
+        SetShape { name: name.to_owned(), kind, width: 1, height: 1, kept: Kept::EveryBatch, monitored }
+    }
+
     /// Number of bins.
     pub fn bins(&self) -> usize {
         self.width as usize * self.height as usize
@@ -164,14 +198,18 @@ impl Camera {
 
     pub(super) fn shape(&self, channels: Channels) -> SetShape {
         let kept = Kept::Moments { colour: channels == Channels::Rgb };
-        SetShape { name: self.name.clone(), kind: ReceiverKind::Camera, width: self.width, height: self.height, kept }
+        let monitored = monitored(&self.monitor, self.width);
+        let (width, height) = (self.width, self.height);
+        SetShape { name: self.name.clone(), kind: ReceiverKind::Camera, width, height, kept, monitored }
     }
 }
 
 impl Gonio {
     pub(super) fn shape(&self, channels: Channels) -> SetShape {
         let kept = Kept::Moments { colour: channels == Channels::Rgb };
-        SetShape { name: self.name.clone(), kind: ReceiverKind::Gonio, width: self.width, height: self.height, kept }
+        let monitored = monitored(&self.monitor, self.width);
+        let (width, height) = (self.width, self.height);
+        SetShape { name: self.name.clone(), kind: ReceiverKind::Gonio, width, height, kept, monitored }
     }
 }
 
@@ -186,15 +224,32 @@ impl Grid {
 
     pub(super) fn shape(&self) -> SetShape {
         let kept = if self.keep_batches { Kept::EveryBatch } else { Kept::Moments { colour: false } };
-        SetShape { name: self.name.clone(), kind: ReceiverKind::Grid, width: self.columns, height: self.rows, kept }
+        let monitored = monitored(&self.monitor, self.columns);
+        let (width, height) = (self.columns, self.rows);
+        SetShape { name: self.name.clone(), kind: ReceiverKind::Grid, width, height, kept, monitored }
     }
 }
 
 impl Point {
     pub(super) fn shape(&self) -> SetShape {
-        let kept = Kept::EveryBatch;
-        SetShape { name: self.name.clone(), kind: ReceiverKind::Point, width: 1, height: 1, kept }
+        SetShape::single(&self.name, ReceiverKind::Point, vec![0])
     }
+}
+
+impl Region {
+    pub(super) fn shape(&self) -> SetShape {
+        SetShape::single(&self.name, ReceiverKind::Region, Vec::new())
+    }
+}
+
+/// The bins named by \[column, row\] in a set of `width` columns, each once, in ascending order.
+fn monitored(places: &[[u32; 2]], width: u32) -> Vec<u32> {
+    // A checked job has no more than 2^28 bins, and names none beyond them.
+    let mut bins: Vec<u32> =
+        places.iter().map(|[column, row]| row.saturating_mul(width).saturating_add(*column)).collect();
+    bins.sort_unstable();
+    bins.dedup();
+    bins
 }
 
 fn four() -> u32 {

@@ -34,7 +34,7 @@ const BLACK: Rgb = [0, 0, 0];
 /// Writes the picture of `values` to `to`.
 pub(super) fn write(plan: &Plan, merged: &Merged, values: &SetValues, to: &mut impl Write) -> Result<()> {
     let (quantity, unit) = match values.shape.kind {
-        ReceiverKind::Camera | ReceiverKind::Gonio => ("luminance", "cd/m²"),
+        ReceiverKind::Camera | ReceiverKind::Gonio | ReceiverKind::Region => ("luminance", "cd/m²"),
         ReceiverKind::Grid | ReceiverKind::Point => ("illuminance", "lx"),
     };
     let zoom = Zoom::new(values, cell_shape(plan, values));
@@ -249,7 +249,8 @@ mod tests {
     /// Pixels of a cell, of the whole map, and the step between bins drawn.
     fn zoom(width: u32, height: u32, shape: f64) -> ([u32; 2], [u32; 2], u32) {
         let kept = Kept::Moments { colour: false };
-        let shape_of_set = SetShape { name: "x".into(), kind: ReceiverKind::Grid, width, height, kept };
+        let shape_of_set =
+            SetShape { name: "x".into(), kind: ReceiverKind::Grid, width, height, kept, monitored: Vec::new() };
         let values = SetValues { shape: shape_of_set, bins: Vec::new() };
         let zoom = Zoom::new(&values, shape);
         (zoom.cell, zoom.size(&values), zoom.step)

@@ -121,7 +121,7 @@ impl SetValues {
 /// The unit of what a receiver of this kind measures.
 pub(super) fn unit(kind: ReceiverKind) -> &'static str {
     match kind {
-        ReceiverKind::Camera | ReceiverKind::Gonio => "cd/m2",
+        ReceiverKind::Camera | ReceiverKind::Gonio | ReceiverKind::Region => "cd/m2",
         ReceiverKind::Grid | ReceiverKind::Point => "lx",
     }
 }
@@ -133,6 +133,7 @@ pub(super) fn kind_name(kind: ReceiverKind) -> &'static str {
         ReceiverKind::Gonio => "gonio",
         ReceiverKind::Grid => "grid",
         ReceiverKind::Point => "point",
+        ReceiverKind::Region => "region",
     }
 }
 

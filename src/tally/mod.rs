@@ -6,10 +6,12 @@
 //! quantity it counts nor where its bins lie.
 
 mod moments;
+mod monitor;
 mod replicates;
 pub mod statistics;
 
 pub use moments::{MomentBlock, Moments};
+pub use monitor::Watched;
 pub use replicates::Replicates;
 
 use crate::job::{Kept, SetShape};
@@ -30,6 +32,8 @@ pub struct Scores {
     pub peak: Vec<f64>,
     /// Whether the receiver of the bin existed: a surface that reflects was hit.
     pub existed: Vec<bool>,
+    /// Single histories of the monitored bins, in their order.
+    pub watched: Vec<Watched>,
 }
 
 impl Scores {
@@ -43,6 +47,7 @@ impl Scores {
             colour: vec![[0.0; 3]; if colour { bins } else { 0 }],
             peak: vec![0.0; bins],
             existed: vec![false; bins],
+            watched: vec![Watched::default(); shape.monitored.len()],
         }
     }
 

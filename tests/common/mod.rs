@@ -3,6 +3,7 @@
 
 pub mod scenes;
 
+use lampyris::farm::pilot::bounds;
 use lampyris::farm::realization::Realization;
 use lampyris::job::Job;
 use lampyris::scene::{Model, Scene};
@@ -22,6 +23,8 @@ const ROUNDING: f64 = 2e-6;
 pub struct Case {
     pub job: Job,
     pub scene: Scene,
+    /// b of the bounded kernel, as a plan holds it.
+    pub bounds: Vec<f64>,
 }
 
 impl Case {
@@ -30,12 +33,13 @@ impl Case {
         let named = if model.triangles.is_empty() { "" } else { "scene = \"in memory\"\n" };
         let job = Job::parse(&format!("{named}{toml}"), "test.toml").unwrap();
         let scene = Scene::new(model, &job).unwrap();
-        Case { job, scene }
+        let bounds = bounds(&job, &scene);
+        Case { job, scene, bounds }
     }
 
     /// Scores of all batches, vertices limited to `orders`.
     pub fn batches(&self, orders: Range<u32>) -> (Vec<Vec<f64>>, Vec<BatchScores>) {
-        let realization = Realization::new(&self.job, &self.scene).with_orders(orders);
+        let realization = Realization::new(&self.job, &self.scene, &self.bounds).with_orders(orders);
         let scores = (0..self.job.run.batches).map(|i| realization.batch(i)).collect();
         (realization.fixed_direct().to_vec(), scores)
     }

@@ -5,7 +5,7 @@ use serde_json::Value;
 
 /// Fields of a job that may change without touching the content of a shard: `scene` is a name, and inputs count
 /// by content.
-const FREE: [&str; 4] = ["scene", "run.batches", "run.confidence", "run.checkpoint_seconds"];
+const FREE: [&str; 6] = ["scene", "run.batches", "run.confidence", "run.checkpoint_seconds", "stop", "ratio"];
 
 impl Plan {
     /// What makes the shards of this plan differ from those of `old`, one line each; empty when nothing does.

@@ -2,7 +2,8 @@
 //!
 //! Shard k holds the batches [k n, k n + n) with n = `batches_per_shard`, whatever the total and the number of
 //! workers. The digest covers all that determines the content of a shard, so a checkpoint belongs to a plan exactly
-//! when the digests agree; `batches`, `confidence` and `checkpoint_seconds` stay outside and may change.
+//! when the digests agree; `batches`, `confidence`, `checkpoint_seconds`, `[stop]` and `[[ratio]]` stay outside and may
+//! change.
 
 mod difference;
 mod size;
@@ -10,7 +11,9 @@ mod size;
 pub use size::{KEPT_LIMIT, MAX_SHARDS, Sizes, human};
 
 use crate::error::Result;
-use crate::job::{Camera, Channels, Gonio, Grid, Job, Plane, Point, Roulette, SetShape, Source, Sphere};
+use crate::job::{
+    Camera, Channels, Estimator, Gonio, Grid, Job, Plane, Point, Region, Roulette, Sampling, SetShape, Source, Sphere,
+};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
@@ -62,6 +65,8 @@ pub struct Plan {
     pub job_file: Input,
     /// What the scene is made of.
     pub scene: SceneSummary,
+    /// b of the bounded kernel, one for each receiver set in job order \[1/m2\]; empty where nothing is bounded.
+    pub bounds: Vec<f64>,
     /// The job, every default resolved.
     pub job: Job,
 }
@@ -74,12 +79,16 @@ struct Content<'a> {
     histories_per_batch: u64,
     batches_per_shard: u64,
     channels: Channels,
+    sampling: Sampling,
+    estimator: Estimator,
+    bounds: &'a [f64],
     roulette_below: Option<f64>,
     inputs: Vec<&'a str>,
     cameras: Vec<CameraContent<'a>>,
     gonios: &'a [Gonio],
     grids: &'a [Grid],
     points: &'a [Point],
+    regions: &'a [Region],
     planes: &'a [Plane],
     spheres: &'a [Sphere],
     sources: &'a [Source],
@@ -88,7 +97,7 @@ struct Content<'a> {
 /// A camera with its absent fields marked: its own serialisation leaves them out, and two cameras could then
 /// have the same bytes.
 type Vector = Option<[f64; 3]>;
-type CameraContent<'a> = (&'a str, &'a Option<String>, [Vector; 3], Option<f64>, [u32; 3]);
+type CameraContent<'a> = (&'a str, &'a Option<String>, [Vector; 3], Option<f64>, [u32; 3], &'a [[u32; 2]]);
 
 impl Input {
     /// The input file `name` with the content `bytes`.
@@ -99,15 +108,23 @@ impl Input {
 }
 
 impl Plan {
-    /// The plan of `job`, called `name`, over the scene described by `inputs` and `scene`.
+    /// The plan of `job`, called `name`, over the scene described by `inputs` and `scene`, its kernel bounded by
+    /// `bounds`.
     ///
     /// # Errors
     /// [`crate::error::Error::Input`] where the plan would have too many shards or keep too many batch scores.
-    pub fn new(name: &str, job: Job, job_file: Input, inputs: Vec<Input>, scene: SceneSummary) -> Result<Plan> {
+    pub fn new(
+        name: &str,
+        job: Job,
+        job_file: Input,
+        inputs: Vec<Input>,
+        scene: SceneSummary,
+        bounds: Vec<f64>,
+    ) -> Result<Plan> {
         let program = env!("CARGO_PKG_VERSION").to_owned();
         let digest = String::new();
-        let mut plan =
-            Plan { program, numerics: NUMERICS, name: name.to_owned(), digest, inputs, job_file, scene, job };
+        let name = name.to_owned();
+        let mut plan = Plan { program, numerics: NUMERICS, name, digest, inputs, job_file, scene, bounds, job };
         plan.digest = plan.content_digest().to_hex().to_string();
         plan.check_sizes()?;
         Ok(plan)
@@ -115,13 +132,16 @@ impl Plan {
 
     /// BLAKE3 of all that determines the content of a shard.
     pub fn content_digest(&self) -> blake3::Hash {
-        let Job { scene: _, run, transport, cameras, grids, points, gonios, planes, spheres, sources } = &self.job;
+        let Job { run, transport, cameras, grids, points, gonios, regions, planes, spheres, sources, .. } = &self.job;
         let content = Content {
             numerics: self.numerics,
             seed: run.seed,
             histories_per_batch: run.histories_per_batch,
             batches_per_shard: run.batches_per_shard,
             channels: run.channels,
+            sampling: run.sampling,
+            estimator: transport.estimator,
+            bounds: &self.bounds,
             roulette_below: match transport.roulette_below {
                 Roulette::Below(share) => Some(share),
                 Roulette::Analog(_) => None,
@@ -131,6 +151,7 @@ impl Plan {
             gonios,
             grids,
             points,
+            regions,
             planes,
             spheres,
             sources,
@@ -163,8 +184,8 @@ impl Plan {
 }
 
 fn camera_content(camera: &Camera) -> CameraContent<'_> {
-    let Camera { name, node, eye, target, up, vertical_fov_degrees, width, height, pixel_samples } = camera;
-    (name, node, [*eye, *target, *up], *vertical_fov_degrees, [*width, *height, *pixel_samples])
+    let Camera { name, node, eye, target, up, vertical_fov_degrees, width, height, pixel_samples, monitor } = camera;
+    (name, node, [*eye, *target, *up], *vertical_fov_degrees, [*width, *height, *pixel_samples], monitor)
 }
 
 #[cfg(test)]

@@ -115,7 +115,7 @@ fn score_bytes(set: &SetShape) -> u64 {
     };
     let placed = match set.kind {
         ReceiverKind::Camera | ReceiverKind::Gonio => RECEIVER,
-        ReceiverKind::Grid | ReceiverKind::Point => RECEIVER / 2,
+        ReceiverKind::Grid | ReceiverKind::Point | ReceiverKind::Region => RECEIVER / 2,
     };
     set.bins() as u64 * (numbers * NUMBER + placed)
 }

@@ -22,6 +22,8 @@ pub struct ReceiverSet {
     bins: Bins,
     stream: Stream,
     histories: u64,
+    /// b of the bounded kernel \[1/m2\]; infinite where nothing is bounded.
+    bound: f64,
     /// Where each bin lies, of a surface point seen from all directions; empty for others.
     sights: Vec<Sight>,
 }
@@ -66,8 +68,9 @@ struct BinScore {
 }
 
 impl ReceiverSet {
-    /// All receiver sets of `job` in the order of [`Job::sets`]; the job has passed [`ReceiverSet::check`].
-    pub fn all(job: &Job, scene: &Scene) -> Vec<ReceiverSet> {
+    /// All receiver sets of `job` in the order of [`Job::sets`], regions left out; the job has passed
+    /// [`ReceiverSet::check`]. `bounds` holds b of each set \[1/m2\], or is empty where nothing is bounded.
+    pub fn all(job: &Job, scene: &Scene, bounds: &[f64]) -> Vec<ReceiverSet> {
         let mut bins = Vec::new();
         for camera in &job.cameras {
             let eye = camera_eye(scene, camera);
@@ -85,13 +88,15 @@ impl ReceiverSet {
         for point in &job.points {
             bins.push(Bins::Meters(vec![meter(scene, point.position, point.normal)]));
         }
-        job.sets().into_iter().zip(bins).map(|(shape, bins)| ReceiverSet::new(job, shape, bins)).collect()
+        let bound = |set: usize| bounds.get(set).copied().unwrap_or(f64::INFINITY);
+        let sets = job.sets().into_iter().zip(bins).enumerate();
+        sets.map(|(i, (shape, bins))| ReceiverSet::new(job, shape, bins, bound(i))).collect()
     }
 
-    fn new(job: &Job, shape: SetShape, bins: Bins) -> Self {
+    fn new(job: &Job, shape: SetShape, bins: Bins, bound: f64) -> Self {
         let stream = Stream::new(job.run.seed, Domain::Receiver, &shape.name);
         let histories = job.run.histories_per_batch;
-        let mut set = ReceiverSet { shape, bins, stream, histories, sights: Vec::new() };
+        let mut set = ReceiverSet { shape, bins, stream, histories, bound, sights: Vec::new() };
         if let Bins::Film { eye: eye @ Eye::Surface { .. }, .. } = &set.bins {
             set.sights = (0..set.shape.bins()).map(|i| set.probe(eye, i)).collect();
         }
