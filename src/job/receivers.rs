@@ -32,7 +32,7 @@ pub struct Camera {
     #[serde(default = "four")]
     pub pixel_samples: u32,
     /// Bins, as \[column, row\], whose single histories are watched for the health of their intervals.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(default)]
     pub monitor: Vec<[u32; 2]>,
 }
 
@@ -71,7 +71,7 @@ pub struct Grid {
     #[serde(default = "yes")]
     pub keep_batches: bool,
     /// Bins, as \[column, row\], whose single histories are watched for the health of their intervals.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(default)]
     pub monitor: Vec<[u32; 2]>,
 }
 
@@ -109,7 +109,7 @@ pub struct Gonio {
     #[serde(default = "four")]
     pub pixel_samples: u32,
     /// Bins, as \[column, row\], whose single histories are watched for the health of their intervals.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(default)]
     pub monitor: Vec<[u32; 2]>,
 }
 

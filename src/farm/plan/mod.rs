@@ -88,7 +88,7 @@ struct Content<'a> {
     gonios: &'a [Gonio],
     grids: &'a [Grid],
     points: &'a [Point],
-    regions: &'a [Region],
+    regions: Vec<RegionContent<'a>>,
     planes: &'a [Plane],
     spheres: &'a [Sphere],
     sources: &'a [Source],
@@ -98,6 +98,9 @@ struct Content<'a> {
 /// have the same bytes.
 type Vector = Option<[f64; 3]>;
 type CameraContent<'a> = (&'a str, &'a Option<String>, [Vector; 3], Option<f64>, [u32; 3], &'a [[u32; 2]]);
+
+/// The same for a region.
+type RegionContent<'a> = (&'a str, &'a str, Option<[u32; 4]>, &'a Option<String>);
 
 impl Input {
     /// The input file `name` with the content `bytes`.
@@ -151,7 +154,7 @@ impl Plan {
             gonios,
             grids,
             points,
-            regions,
+            regions: regions.iter().map(region_content).collect(),
             planes,
             spheres,
             sources,
@@ -186,6 +189,11 @@ impl Plan {
 fn camera_content(camera: &Camera) -> CameraContent<'_> {
     let Camera { name, node, eye, target, up, vertical_fov_degrees, width, height, pixel_samples, monitor } = camera;
     (name, node, [*eye, *target, *up], *vertical_fov_degrees, [*width, *height, *pixel_samples], monitor)
+}
+
+fn region_content(region: &Region) -> RegionContent<'_> {
+    let Region { name, camera, rectangle, node } = region;
+    (name, camera, *rectangle, node)
 }
 
 #[cfg(test)]

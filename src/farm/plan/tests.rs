@@ -62,7 +62,7 @@ fn inputs_count_by_content_and_are_named() {
     let with = |files: &[(&str, &str)]| {
         let inputs = files.iter().map(|(name, content)| Input::of(name, content.as_bytes())).collect();
         let base = plan();
-        Plan::new("test", base.job, base.job_file, inputs, base.scene).unwrap()
+        Plan::new("test", base.job, base.job_file, inputs, base.scene, base.bounds).unwrap()
     };
     let old = with(&[("room.gltf", "a"), ("room.bin", "b")]);
     assert_eq!(old.digest, with(&[("moved.gltf", "a"), ("room.bin", "b")]).digest);
@@ -94,6 +94,7 @@ fn cameras_with_and_without_optional_fields_have_different_bytes() {
         width: 1,
         height: 1,
         pixel_samples: 1,
+        monitor: Vec::new(),
     };
     let bytes = |c: &Camera| postcard::to_stdvec(&camera_content(c)).unwrap();
     let zeros = "\0".repeat(24);
