@@ -68,6 +68,7 @@ fn plan(job: &str) -> Plan {
             bytes: 0,
             warnings: vec!["range ignored".into()],
         },
+        bounds: Vec::new(),
         job: Job::parse(job, "small.toml").unwrap(),
     }
 }
