@@ -16,7 +16,7 @@ use crate::transport::receiver::Receiver;
 use std::ops::Range;
 
 /// Histories that share a continuation of each receiver: chosen by measured figure of merit (docs/benchmarks.md).
-const HISTORIES_OF_A_PATH: usize = 4;
+const HISTORIES_OF_A_PATH: usize = 2;
 
 /// Scores of the bins of one tile.
 pub struct TileScores(Vec<BinScore>);
