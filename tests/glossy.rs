@@ -100,7 +100,7 @@ fn orders_agree_with_a_backward_path_tracer() {
 
 #[test]
 fn lambert_receiver_is_rho_over_pi_times_the_lux_meter() {
-    let job = "[run]\nhistories_per_batch = 64\nbatches = 4\n".to_owned()
+    let job = "[run]\nhistories_per_batch = 64\nbatches = 16\n".to_owned()
         + &spot_camera("l", [0.4, 0.9, 0.4], [0.4, 0.0, 0.4], [1.0, 0.0, 0.0])
         + &point("e", [0.4, 0.0, 0.4], [0.0, 1.0, 0.0]);
     let case = Case::new(&job, glossy_cube_with_lambert_floor());

@@ -84,7 +84,10 @@ impl<'a> Realization<'a> {
     /// The quasi-random set of a batch, where the job asks for one.
     fn points(&self, batch: u64) -> Option<PointSet> {
         let count = self.job.run.histories_per_batch;
-        let set = || PointSet::new(&self.scrambling, batch, count.ilog2());
+        let set = || {
+            assert!(count.is_power_of_two(), "the job was checked: {count} histories");
+            PointSet::new(&self.scrambling, batch, count.ilog2())
+        };
         (self.job.run.sampling == Sampling::Rqmc).then(set)
     }
 

@@ -145,10 +145,11 @@ impl Generator {
     }
 }
 
-/// Direction uniform over the sphere, from a point of the unit square.
+/// Direction uniform over the sphere, from a point of the unit square. The polar axis is +Y, the vertical of glTF:
+/// the first coordinate of a quasi-random point then tells floor from ceiling by itself.
 pub fn sphere(u: DVec2) -> DVec3 {
-    let z = 1.0 - 2.0 * u.x;
-    around_z(z, u.y)
+    let d = around_z(1.0 - 2.0 * u.x, u.y);
+    DVec3::new(d.y, d.z, d.x)
 }
 
 /// Direction of the hemisphere around +Z with density cosine/pi, from a point of the unit square.
