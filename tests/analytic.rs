@@ -48,7 +48,7 @@ fn floor_far_below() -> Model {
 fn point_source() {
     for x in [0.0, 1.0, 3.0] {
         let parameters = format!("I0=100;h=2;x={x};m=0");
-        let job = run(1, 1)
+        let job = run(1, 16)
             + &omni([0.0, 2.0, 0.0], 100.0)
             + &point("horizontal", [x, 0.0, 0.0], [0.0, 1.0, 0.0])
             + &point("vertical", [x, 0.0, 0.0], [-1.0, 0.0, 0.0]);

@@ -11,6 +11,7 @@ const JOB: &str = r#"
 histories_per_batch = 1
 batches = 4
 batches_per_shard = 2
+sampling = "random"
 [[camera]]
 name = "view"
 eye = [0.0, 1.0, 3.0]
@@ -86,6 +87,18 @@ fn bad_values_in_a_job_are_named_with_field_value_and_range() {
         ("batches = 4", "batches = 0", "run.batches = 0: 1 .. 4294967296"),
         ("batches = 4", "batches = -4", "run.batches (line 4) = batches = -4: invalid value: integer `-4`"),
         ("batches = 4", "batches = \"many\"", "run.batches (line 4) = batches = \"many\": invalid type: string"),
+        ("sampling = \"random\"", "", "run.batches = 4: at least 16; any number with sampling = \"random\""),
+        ("sampling = \"random\"", "sampling = \"sobol\"", "unknown variant `sobol`, expected `rqmc` or `random`"),
+        (
+            "histories_per_batch = 1\nbatches = 4\nbatches_per_shard = 2\nsampling = \"random\"",
+            "histories_per_batch = 2000\nbatches = 16",
+            "run.histories_per_batch = 2000: a power of two: 1024 or 2048; any number with sampling = \"random\"",
+        ),
+        (
+            "histories_per_batch = 1\nbatches = 4\nbatches_per_shard = 2\nsampling = \"random\"",
+            "histories_per_batch = 1048575\nbatches = 16",
+            "a power of two: 524288 or 1048576;",
+        ),
         ("[run]", "[run]\nseed = -1", "run.seed (line 3) = seed = -1: invalid value"),
         ("[run]", "[run]\nhistories = 3", "run.histories (line 3) = histories = 3: unknown field `histories`"),
         ("[run]", "[run]\nconfidence = 1.0", "run.confidence = 1: between 0 and 1, exclusive"),

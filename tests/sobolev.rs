@@ -109,7 +109,7 @@ fn orders_of_case_b() {
 fn standard_deviations(name: &str, estimator: &str, roulette: &str) {
     let (h1, rho1, rho2) = case(name);
     let run = format!(
-        "[run]\nhistories_per_batch = 1\nbatches = {}\nseed = 13\n[transport]\nroulette_below = {roulette}",
+        "[run]\nsampling = \"random\"\nhistories_per_batch = 1\nbatches = {}\nseed = 13\n[transport]\nroulette_below = {roulette}",
         1 << 17
     );
     let mut job = sobolev(&run, h1, rho1, rho2);

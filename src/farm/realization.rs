@@ -6,7 +6,8 @@
 
 use super::ordering::kd_order;
 use super::receivers::{ReceiverSet, TileScores};
-use crate::job::{Channels, Job};
+use crate::job::{Channels, Job, Sampling};
+use crate::random::sobol::PointSet;
 use crate::random::{Domain, Stream};
 use crate::scene::Scene;
 use crate::tally::{BatchScores, Scores};
@@ -27,6 +28,7 @@ pub struct Realization<'a> {
     orders_of_bins: Vec<Vec<u32>>,
     fixed_direct: Vec<Vec<f64>>,
     trajectories: Stream,
+    scrambling: Stream,
     orders: Range<u32>,
 }
 
@@ -37,7 +39,9 @@ impl<'a> Realization<'a> {
         let orders_of_bins = sets.iter().map(|s| order_of_bins(s, scene)).collect();
         let fixed_direct = sets.iter().map(|s| fixed_direct(s, scene)).collect();
         let trajectories = Stream::new(job.run.seed, Domain::Trajectory, "");
-        Realization { job, scene, sets, orders_of_bins, fixed_direct, trajectories, orders: 1..u32::MAX }
+        let scrambling = Stream::new(job.run.seed, Domain::Scrambling, "");
+        let orders = 1..u32::MAX;
+        Realization { job, scene, sets, orders_of_bins, fixed_direct, trajectories, scrambling, orders }
     }
 
     /// The same realization with only the vertices x_n, n in `orders`, connected: for tests order by order.
@@ -62,11 +66,11 @@ impl<'a> Realization<'a> {
     /// Traces the histories of a batch and prepares their vertices.
     fn trace(&self, index: u64) -> (Connectors, FluxBalance) {
         let count = self.job.run.histories_per_batch;
-        let first = index * count;
+        let points = self.points(index);
         let starts: Vec<u64> = (0..count).step_by(HISTORIES_AT_ONCE as usize).collect();
         let traced: Vec<_> = starts
             .into_par_iter()
-            .map(|start| self.trace_some(first + start..first + (start + HISTORIES_AT_ONCE).min(count)))
+            .map(|start| self.trace_some(index, start..(start + HISTORIES_AT_ONCE).min(count), points.as_ref()))
             .collect();
         let mut connectors = Connectors::default();
         let mut flux = FluxBalance::default();
@@ -77,14 +81,29 @@ impl<'a> Realization<'a> {
         (connectors, flux)
     }
 
-    fn trace_some(&self, histories: Range<u64>) -> Vec<(Vec<Vertex>, FluxBalance)> {
-        let trace = |history| {
+    /// The quasi-random set of a batch, where the job asks for one.
+    fn points(&self, batch: u64) -> Option<PointSet> {
+        let count = self.job.run.histories_per_batch;
+        let set = || {
+            assert!(count.is_power_of_two(), "the job was checked: {count} histories");
+            PointSet::new(&self.scrambling, batch, count.ilog2())
+        };
+        (self.job.run.sampling == Sampling::Rqmc).then(set)
+    }
+
+    /// Traces the histories `range` of a batch; history i starts with point i of `points`.
+    fn trace_some(&self, batch: u64, range: Range<u64>, points: Option<&PointSet>) -> Vec<(Vec<Vertex>, FluxBalance)> {
+        let first = batch * self.job.run.histories_per_batch;
+        let trace = |i: u64| {
             let mut vertices = Vec::new();
-            let mut rng = self.trajectories.generator(history);
+            let mut rng = self.trajectories.generator(first + i);
+            if let Some(points) = points {
+                rng = rng.after(points.point(i as u32));
+            }
             let flux = trace(self.scene, &self.job.transport, &mut rng, &mut vertices);
             (vertices, flux)
         };
-        histories.map(trace).collect()
+        range.map(trace).collect()
     }
 
     /// The scores of one receiver set.

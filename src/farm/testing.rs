@@ -12,6 +12,7 @@ use crate::tally::{BatchScores, Scores, Tally};
 pub const JOB: &str = r#"
 [run]
 seed = 7
+sampling = "random"
 batches = 10
 batches_per_shard = 4
 channels = "rgb"

@@ -1,6 +1,6 @@
 //! Every check on what a user typed: each refusal names the field, the value and what is allowed.
 
-use super::{Camera, Estimator, Gonio, Grid, Job, Kept, Ratio, ReceiverKind, Region, Roulette, Source, Stop};
+use super::{Camera, Estimator, Gonio, Grid, Job, Kept, Ratio, ReceiverKind, Region, Roulette, Sampling, Source, Stop};
 use crate::error::{Error, Result};
 use std::collections::HashSet;
 use std::fmt::Debug;
@@ -9,6 +9,8 @@ use std::fmt::Debug;
 const MAX_BINS: u64 = 1 << 28;
 /// Largest coordinate \[m\]: beyond it positions in f32 say little.
 const MAX_METRES: f64 = 1e6;
+/// Fewest batches of quasi-random sets: only batches tell the error, and fewer tell it badly.
+const MIN_RQMC_BATCHES: u64 = 16;
 /// Most bins of one set that are watched history by history.
 const MAX_MONITORED: usize = 1024;
 
@@ -16,6 +18,7 @@ const MAX_MONITORED: usize = 1024;
 pub(super) fn check(job: &Job, file: &str) -> Result<()> {
     let c = Checker { file };
     check_run(&c, job)?;
+    check_sampling(&c, job)?;
     check_names(&c, job)?;
     for (i, camera) in job.cameras.iter().enumerate() {
         check_camera(&c, &format!("camera[{i}]"), camera, job.scene.is_some())?;
@@ -123,6 +126,21 @@ fn check_run(c: &Checker, job: &Job) -> Result<()> {
         c.that("transport.roulette_below", below, below > 0.0 && below <= 1.0, allowed)?;
     }
     Ok(())
+}
+
+/// A scrambled set has 2^m points; with `[stop]` the number of batches is not `run.batches`, and has its own limits.
+fn check_sampling(c: &Checker, job: &Job) -> Result<()> {
+    let run = &job.run;
+    if run.sampling == Sampling::Random {
+        return Ok(());
+    }
+    let n = run.histories_per_batch;
+    let (below, above) = (1u64 << n.ilog2(), n.next_power_of_two());
+    let allowed = format!("a power of two: {below} or {above}; any number with sampling = \"random\"");
+    c.that("run.histories_per_batch", n, n.is_power_of_two(), &allowed)?;
+    let enough = job.stop.is_some() || run.batches >= MIN_RQMC_BATCHES;
+    let allowed = format!("at least {MIN_RQMC_BATCHES}; any number with sampling = \"random\"");
+    c.that("run.batches", run.batches, enough, &allowed)
 }
 
 fn check_names(c: &Checker, job: &Job) -> Result<()> {

@@ -86,7 +86,7 @@ impl Default for Run {
             histories_per_batch: 64,
             batches: 256,
             batches_per_shard: 32,
-            sampling: Sampling::Random,
+            sampling: Sampling::Rqmc,
             confidence: 0.95,
             channels: Channels::Luminance,
             checkpoint_seconds: 30.0,

@@ -121,5 +121,5 @@ fn play(roulette: Roulette, first: f64, weight: Colour, reflected: Colour, rng: 
     if survival >= 1.0 {
         return Some(reflected);
     }
-    (rng.uniform() < survival).then(|| reflected / survival)
+    rng.chance(survival).then(|| reflected / survival)
 }

@@ -22,6 +22,7 @@ const JOB: &str = r#"
 seed = 7
 histories_per_batch = 10
 batches = 20
+sampling = "random"
 [[camera]]
 name = "view"
 eye = [0.0, 0.0, 0.0]
