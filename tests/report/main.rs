@@ -120,6 +120,8 @@ fn merged(n: u64) -> Merged {
         flux: flux(n),
         batches: n,
         missing: Vec::new(),
+        stopped: None,
+        looks: Vec::new(),
         seconds: 4.0,
     }
 }
