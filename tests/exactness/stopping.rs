@@ -88,7 +88,10 @@ fn one_two_and_five_workers_stop_at_the_same_batch_with_the_bits_of_a_run_planne
     for workers in [1, 2, 5] {
         let dir = place.path(&format!("by-{workers}"));
         let said = expect(0, &mut run_quietly(&job, &dir, workers));
-        assert!(said.contains("stopped at 30 batches (look 2): the 95 % interval of table_height, floor is within"), "{said}");
+        assert!(
+            said.contains("stopped at 30 batches (look 2): the 95 % interval of table_height, floor is within"),
+            "{said}"
+        );
         assert!(said.contains("% in 50 % of the bins\n") && !said.contains("incomplete"), "{said}");
         assert_stopped_at_thirty(&dir);
         // Nobody went on for long.

@@ -5,6 +5,7 @@ mod maps;
 mod tables;
 mod whole;
 
+use lampyris::farm::merge::goal::{Look, Stopped};
 use lampyris::farm::merge::{Merged, SetResult};
 use lampyris::farm::plan::{Input, Plan, SceneSummary};
 use lampyris::job::Job;
