@@ -8,35 +8,29 @@ use crate::farm::checkpoint::{Header, read_header};
 use crate::farm::folder::Folder;
 use crate::farm::plan::Plan;
 use crate::job::Stop;
-use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// The plan of all folders; the one with the most batches where they differ in that.
 pub(super) fn common_plan(folders: &[Folder]) -> Result<Plan> {
-    let mut common: Option<Plan> = None;
-    for folder in folders {
-        let plan = folder.read_plan()?;
-        let Some(first) = &common else {
-            common = Some(plan);
-            continue;
-        };
+    let plans: Vec<Plan> = folders.iter().map(Folder::read_plan).collect::<Result<_>>()?;
+    let Some(first) = plans.first() else {
+        return Err(Error::input("command line", "DIR", "(none)", "at least one folder"));
+    };
+    let longest = plans.iter().fold(first, |a, b| if b.job.run.batches > a.job.run.batches { b } else { a });
+    for (folder, plan) in folders.iter().zip(&plans) {
         let differences = plan.differences(first);
         if !differences.is_empty() {
             let reason = format!("another plan than that of the first folder:\n  {}", differences.join("\n  "));
             return Err(Error::refused(&folder.plan_path(), reason));
         }
-        match plan.job.run.batches.cmp(&first.job.run.batches) {
-            Ordering::Greater => common = Some(plan),
-            // Which of them counted would depend on the order of the folders, and the result on that.
-            Ordering::Equal if goal(&plan) != goal(first) => {
-                let reason = "another goal than in a folder before it: run or plan the job on both folders first";
-                return Err(Error::refused(&folder.plan_path(), reason));
-            }
-            Ordering::Equal | Ordering::Less => {}
+        // Which of two goals counted would depend on the order of the folders, and the result on that.
+        if plan.job.run.batches == longest.job.run.batches && goal(plan) != goal(longest) {
+            let reason = "another goal than in a folder before it: plan the job on both folders first";
+            return Err(Error::refused(&folder.plan_path(), reason));
         }
     }
-    common.ok_or_else(|| Error::input("command line", "DIR", "(none)", "at least one folder"))
+    Ok(longest.clone())
 }
 
 /// All that decides when a run is at its goal.

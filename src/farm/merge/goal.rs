@@ -57,6 +57,11 @@ impl Goal {
         Some(Goal { stop, confidence: plan.job.run.confidence, sets })
     }
 
+    /// Numbers of the sets that must reach it.
+    pub fn sets(&self) -> Vec<usize> {
+        self.sets.iter().map(|(set, ..)| *set).collect()
+    }
+
     /// Looks at the sets after `batches` batches; `estimate` gives that of (set, bin), None without a receiver.
     pub fn look(&self, batches: u64, estimate: impl Fn(usize, usize) -> Option<Estimate>) -> Look {
         let quantile = student_quantile(self.confidence, batches);

@@ -60,7 +60,7 @@ pub struct Merged {
     pub stopped: Option<Stopped>,
     /// What was seen at every look that could be judged, up to the one at which the goal was reached.
     pub looks: Vec<Look>,
-    /// Time spent by all workers \[s\].
+    /// Time spent by all workers on the batches merged \[s\].
     pub seconds: f64,
 }
 
@@ -76,30 +76,32 @@ pub fn merge(folders: &[Folder]) -> Result<(Plan, Merged)> {
         let path = folders.first().map_or(Path::new("."), |f| f.root());
         return Err(Error::refused(path, "holds no checkpoint yet: nothing to merge"));
     }
-    let merged = fold(&plan, chosen.values())?.result();
+    let read = (0..plan.sets().len()).collect();
+    let merged = fold(&plan, chosen.values(), read)?.result();
     Ok((plan, merged))
 }
 
 /// The number of batches after which the goal of the plan in `folders` has been reached; None when it has not yet.
-/// Reads no batch beyond the last look that can be judged.
+/// Reads no batch beyond the last look that can be judged, and no set that the goal does not ask for.
 ///
 /// # Errors
 /// As [`merge`].
 pub fn goal_reached(folders: &[Folder]) -> Result<Option<u64>> {
     let plan = common_plan(folders)?;
+    let Some(goal) = Goal::of(&plan) else { return Ok(None) };
     let chosen = choose(&plan, folders)?;
     let done = chosen.values().map(|c| (c.header.shard, c.header.batches()));
     let last = plan.last_look(done).unwrap_or(0);
     let before = chosen.values().take_while(|c| plan.shard(c.header.shard).start < last);
-    Ok(match fold(&plan, before)?.stopped() {
+    Ok(match fold(&plan, before, goal.sets())?.stopped() {
         Some(Stopped::GoalReached { batches }) => Some(batches),
         Some(Stopped::Limit) | None => None,
     })
 }
 
-/// Folds shard after shard, up to the look at which the goal is reached.
-fn fold<'a>(plan: &'a Plan, files: impl Iterator<Item = &'a Candidate>) -> Result<Fold<'a>> {
-    let mut fold = Fold::new(plan);
+/// Folds the sets numbered in `read` shard after shard, up to the look at which the goal is reached.
+fn fold<'a>(plan: &'a Plan, files: impl Iterator<Item = &'a Candidate>, read: Vec<usize>) -> Result<Fold<'a>> {
+    let mut fold = Fold::new(plan, read);
     for file in files {
         fold.take(file)?;
         if fold.goal_reached() {
@@ -113,6 +115,8 @@ fn fold<'a>(plan: &'a Plan, files: impl Iterator<Item = &'a Candidate>) -> Resul
 struct Fold<'a> {
     plan: &'a Plan,
     shapes: Vec<SetShape>,
+    /// Numbers of the sets that are folded; the others stay empty.
+    read: Vec<usize>,
     sets: Vec<SetFold>,
     flux: Replicates,
     /// Direct light of every set with the file and the checksums it was taken from.
@@ -141,7 +145,7 @@ impl SetFold {
 }
 
 impl<'a> Fold<'a> {
-    fn new(plan: &'a Plan) -> Self {
+    fn new(plan: &'a Plan, read: Vec<usize>) -> Self {
         let shapes = plan.sets();
         let empty = |shape: &SetShape| match shape.kept {
             Kept::Moments { .. } => SetFold::Moments(Vec::new()),
@@ -150,7 +154,8 @@ impl<'a> Fold<'a> {
         let sets = shapes.iter().map(empty).collect();
         let flux = Replicates::new(FLUX_BINS.len());
         let (done, looks) = (Vec::new(), Vec::new());
-        Fold { plan, shapes, sets, flux, fixed: None, batches: 0, seconds: 0.0, done, goal: Goal::of(plan), looks }
+        let goal = Goal::of(plan);
+        Fold { plan, shapes, read, sets, flux, fixed: None, batches: 0, seconds: 0.0, done, goal, looks }
     }
 
     /// Folds in the next shard.
@@ -165,8 +170,8 @@ impl<'a> Fold<'a> {
         check_length(self.plan, shard, &file.path, reader.header())?;
         let n = reader.header().batches();
         self.take_fixed(&mut reader, &file.path)?;
-        for (set, fold) in self.sets.iter_mut().enumerate() {
-            match fold {
+        for &set in &self.read {
+            match &mut self.sets[set] {
                 SetFold::Moments(blocks) => {
                     take_blocks(blocks, &mut reader, set, &self.shapes[set], (self.batches, n))?
                 }

@@ -226,7 +226,26 @@ fn a_look_is_judged_only_with_every_shard_before_it() {
     assert_eq!(short, (None, 1, 35, vec![23..24, 36..40]));
     // Without an early shard no look can be judged, and what there is, is merged.
     assert_eq!(see(&[&whole(1..9)]), (None, 0, 32, vec![0..4, 36..40]));
-    assert_eq!(see(&[&whole(0..2), &whole(3..10)]), (None, 0, 36, vec![8..12]));
+    assert_eq!(see(&[&whole(0..2), &whole(3..9)]), (None, 0, 32, vec![8..12, 36..40]));
+}
+
+#[test]
+fn the_decision_reads_the_sets_of_the_goal_and_the_batches_before_the_look() {
+    let plan = aiming(width_of_meter(&plan(), 16), r#"["meter"]"#, 40);
+    let (_temp, folders) = folders(&plan, &[&whole(0..7)]);
+    let spoil = |shard: u64, at: fn(usize) -> usize| {
+        let path = folders[0].shard_path(shard);
+        let mut bytes = std::fs::read(&path).unwrap();
+        let at = at(bytes.len());
+        bytes[at] ^= 1;
+        std::fs::write(path, bytes).unwrap();
+    };
+    // Beyond the look; and before it in the moments of the floor, which fill the middle of the file.
+    spoil(6, |length| length - 1);
+    assert_eq!(merged(&folders).batches, 16);
+    spoil(1, |length| length / 2);
+    assert_eq!(goal_reached(&folders).unwrap(), Some(16));
+    assert!(refusal(&folders).contains("shard-000001.ckpt: refused: damaged: wrong checksum of Moments"));
 }
 
 #[test]
@@ -287,10 +306,10 @@ fn folders_with_other_goals_are_refused_unless_one_goes_on_longer() {
         assert!(goal_reached(&dirs).is_err());
         dirs.reverse();
     }
-    let mut pair = vec![dirs[0].clone(), long[0].clone()];
-    for _ in 0..2 {
-        let (plan, result) = merge(&pair).unwrap();
+    dirs.extend(long);
+    for _ in 0..3 {
+        let (plan, result) = merge(&dirs).unwrap();
         assert_eq!((plan.job.run.batches, result.stopped, result.looks.len()), (44, None, 2));
-        pair.reverse();
+        dirs.rotate_left(1);
     }
 }
