@@ -142,6 +142,35 @@ fn bad_values_in_a_job_are_named_with_field_value_and_range() {
         ("radius = 1.0", "radius = 0.0", "sphere[0].radius = 0: above 0, at most 1e6"),
         ("facing = \"outward\"", "facing = \"up\"", "unknown variant `up`, expected `inward` or `outward`"),
         ("kind = \"omni\"", "kind = \"laser\"", "unknown variant `laser`, expected `omni`"),
+        ("[run]", "[stop]\nrelative_half_width = 0\nmax_batches = 4\n[run]", "stop.relative_half_width = 0: between"),
+        ("[run]", "[stop]\nrelative_half_width = nan\nmax_batches = 4\n[run]", "stop.relative_half_width = NaN: betw"),
+        ("[run]", "[stop]\nrelative_half_width = 0.1\n[run]", "missing field `max_batches`"),
+        (
+            "[run]",
+            "[stop]\nrelative_half_width = 0.1\nmax_batches = 4\n[run]",
+            "stop.max_batches = 4: 16 .. 4294967296",
+        ),
+        (
+            "[run]",
+            "[stop]\nrelative_half_width = 0.1\nmax_batches = 20\n[run]",
+            "run.batches = 4: absent with [stop], whose max_batches = 20 is the limit",
+        ),
+        (
+            "[run]\nhistories_per_batch = 1\nbatches = 4\nbatches_per_shard = 2",
+            "[stop]\nrelative_half_width = 0.1\nmax_batches = 20\n[run]\nbatches_per_shard = 32",
+            "stop.max_batches = 20: at least 32, the first look: whole shards of run.batches_per_shard",
+        ),
+        (
+            "[run]",
+            "[stop]\nrelative_half_width = 0.1\nmax_batches = 4\nshare = 0\n[run]",
+            "stop.share = 0: above 0 and",
+        ),
+        ("[run]", "[stop]\nrelative_half_width = 0.1\nmax_batches = 4\nshare = 1.1\n[run]", "stop.share = 1.1: above"),
+        (
+            "batches = 4\nbatches_per_shard = 2",
+            "batches_per_shard = 2\n[stop]\nrelative_half_width = 0.1\nmax_batches = 99\nreceivers = [\"dask\"]",
+            "stop.receivers[0] = dask: one of view, eye, floor, desk",
+        ),
         ("[run]", "scene = \"gone.glb\"\n[run]", "scene = gone.glb: a .glb or .gltf file, relative to the job file"),
     ];
     for (from, to, fragment) in cases {
@@ -257,6 +286,37 @@ fn a_checkpoint_that_is_none_stops_everything_and_stays() {
         assert!(said.contains(fragment), "{args:?}: {said}");
     }
     assert_eq!(fs::read(&path).unwrap(), b"precious, and none of ours");
+}
+
+#[test]
+fn a_goal_fills_in_the_number_of_batches_of_the_plan() {
+    let goal = |batches: &str| {
+        let stop = format!("{batches}batches_per_shard = 2\n[stop]\nrelative_half_width = 0.1\nmax_batches = 99\n");
+        folder_with(&JOB.replacen("batches = 4\nbatches_per_shard = 2\n", &stop, 1))
+    };
+    for typed in ["", "batches = 99\n"] {
+        let folder = goal(typed);
+        let said = expect(folder.path(), 0, &["plan", "job.toml", "-o", "out"]);
+        assert!(said.contains("\nbatches = 99\n") && said.contains("\nmax_batches = 99\n"), "{said}");
+        let said = expect(folder.path(), 0, &["status", "out"]);
+        assert!(said.contains("0 of 99 batches") && said.contains("\nnext look at 16 batches\n"), "{said}");
+        // The limit may be raised, not lowered.
+        for (limit, code, fragment) in
+            [("120", 0, "batches = 120"), ("50", 2, "stop.max_batches: 120 in the plan, 50 now")]
+        {
+            let text = fs::read_to_string(folder.path().join("job.toml")).unwrap();
+            fs::write(folder.path().join("other.toml"), text.replace("= 99", &format!("= {limit}"))).unwrap();
+            let said = expect(folder.path(), code, &["plan", "other.toml", "-o", "out"]);
+            assert!(said.contains(fragment), "{said}");
+        }
+    }
+    let folder = goal("");
+    expect(folder.path(), 0, &["plan", "job.toml", "-o", "out"]);
+    let path = folder.path().join("out/plan.toml");
+    let text = fs::read_to_string(&path).unwrap();
+    fs::write(&path, text.replace("\nbatches = 99\n", "\nbatches = 98\n")).unwrap();
+    let said = expect(folder.path(), 2, &["status", "out"]);
+    assert!(said.contains("run.batches = 98: absent with [stop]"), "{said}");
 }
 
 #[test]

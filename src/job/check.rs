@@ -57,6 +57,17 @@ fn check_estimator(c: &Checker, job: &Job) -> Result<()> {
     c.that("transport.estimator", format!("direct_simulation (with \"{name}\")"), others.is_none(), allowed)
 }
 
+/// With a goal the number of batches is its limit. A plan, in which the limit has been filled in, is read again.
+pub(super) fn check_typed_batches(typed: Option<u64>, stop: &Stop, file: &str) -> Result<()> {
+    match typed {
+        Some(batches) if batches != stop.max_batches => {
+            let allowed = format!("absent with [stop], whose max_batches = {} is the limit", stop.max_batches);
+            Err(Error::input(file, "run.batches", batches, allowed))
+        }
+        _ => Ok(()),
+    }
+}
+
 fn check_stop(c: &Checker, stop: &Stop, job: &Job) -> Result<()> {
     let (half, share) = (stop.relative_half_width, stop.share);
     c.that("stop.relative_half_width", half, half > 0.0 && half < 1.0, "between 0 and 1, exclusive")?;

@@ -65,7 +65,7 @@ pub struct Run {
     pub seed: u64,
     /// Histories of one batch; a batch is one realization, the unit of the variance.
     pub histories_per_batch: u64,
-    /// Number of batches of the whole job.
+    /// Number of batches of the whole job; with `[stop]` its `max_batches`, and not to be typed.
     pub batches: u64,
     /// Shard k holds the batches [k n, k n + n).
     pub batches_per_shard: u64,
@@ -258,12 +258,21 @@ impl Job {
     /// [`Error::Input`] naming the field, its value and the allowed range.
     pub fn parse(text: &str, file: &str) -> Result<Job> {
         let toml = toml::Deserializer::parse(text).map_err(|e| syntax_error(file, text, "(syntax)", &e))?;
-        let job: Job = serde_path_to_error::deserialize(toml).map_err(|e| {
+        let mut job: Job = serde_path_to_error::deserialize(toml).map_err(|e| {
             let field = e.path().to_string();
             syntax_error(file, text, &field, e.inner())
         })?;
+        if let Some(stop) = &job.stop {
+            check::check_typed_batches(typed_batches(text), stop, file)?;
+            job.run.batches = stop.max_batches;
+        }
         check::check(&job, file)?;
         Ok(job)
+    }
+
+    /// The field that says how many batches the job has at most.
+    pub fn batches_field(&self) -> &'static str {
+        if self.stop.is_some() { "stop.max_batches" } else { "run.batches" }
     }
 
     /// All receiver sets in the order of the tallies: cameras, gonios, grids, points, regions.
@@ -275,6 +284,19 @@ impl Job {
         let regions = self.regions.iter().map(|r| r.shape());
         cameras.chain(gonios).chain(grids).chain(points).chain(regions).collect()
     }
+}
+
+/// `run.batches` if it stands in the job file: a default is not what somebody typed.
+fn typed_batches(text: &str) -> Option<u64> {
+    #[derive(Deserialize)]
+    struct Typed {
+        run: Option<TypedRun>,
+    }
+    #[derive(Deserialize)]
+    struct TypedRun {
+        batches: Option<u64>,
+    }
+    toml::from_str::<Typed>(text).ok()?.run?.batches
 }
 
 fn whole() -> f64 {

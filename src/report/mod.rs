@@ -6,7 +6,7 @@
 //! | `<grid>.csv` | illuminance, one row for each grid point, row-major |
 //! | `points.csv` | the same for all lux-meters `[[point]]`, with their names |
 //! | `<name>.png` | false-colour picture of a camera, goniometer or grid and of its relative error |
-//! | `summary.json` | one line of statistics for each receiver set, flux balance, timings, digest of all numbers |
+//! | `summary.json` | one line of statistics for each receiver set, flux balance, timings, what ended the run, digest of all numbers |
 //!
 //! Channels of an EXR file, 32-bit float, row 0 on top, \[cd/m2\] except where said:
 //!
@@ -29,6 +29,7 @@ mod exr;
 mod number;
 mod png;
 mod scale;
+mod stopping;
 mod summary;
 mod text;
 mod values;

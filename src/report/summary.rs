@@ -1,6 +1,7 @@
 //! `summary.json`: what a whole receiver set says in a line, the flux balance, timings, and a digest by which two
 //! runs are compared. A number that is not finite is `null`.
 
+use super::stopping::StoppedBy;
 use super::values::{Bin, FEW_BATCHES, SetValues, Status, kind_name, unit};
 use crate::farm::merge::Merged;
 use crate::farm::plan::{Input, Plan};
@@ -23,6 +24,8 @@ pub(super) struct Summary {
     pub batches: u64,
     /// Half-open ranges of batches.
     pub missing_batches: Vec<[u64; 2]>,
+    /// What ended the run; `null` without a goal.
+    pub stopped_by: Option<StoppedBy>,
     pub histories_per_batch: u64,
     pub histories: u64,
     pub seed: u64,
@@ -133,6 +136,7 @@ impl<'a> Collector<'a> {
             complete: merged.missing.is_empty(),
             batches: merged.batches,
             missing_batches: merged.missing.iter().map(|r| [r.start, r.end]).collect(),
+            stopped_by: StoppedBy::new(plan, merged),
             histories_per_batch: run.histories_per_batch,
             histories,
             seed: run.seed,
@@ -237,6 +241,7 @@ fn warnings(plan: &Plan, merged: &Merged, flux: &Flux, sets: &[SetSummary]) -> V
     if !merged.missing.is_empty() {
         warnings.push(format!("incomplete: batches {} are missing", super::missing_text(merged)));
     }
+    warnings.extend(StoppedBy::new(plan, merged).and_then(|by| by.warning(plan.job.run.confidence)));
     if merged.batches < FEW_BATCHES {
         warnings.push(format!("few batches: {} of the {FEW_BATCHES} that an interval needs", merged.batches));
     }

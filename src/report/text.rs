@@ -15,6 +15,7 @@ pub fn text_summary(plan: &Plan, merged: &Merged) -> String {
     SetValues::all(plan, merged).for_each(|values| collector.add(&values));
     let summary = collector.finish();
     let mut lines = vec![head(&summary)];
+    lines.extend(summary.stopped_by.as_ref().map(|by| by.line(summary.confidence)));
     lines.extend(table(&summary.sets));
     lines.push(balance(&summary));
     lines.extend(summary.warnings.iter().map(|w| format!("warning: {w}")));

@@ -1,7 +1,8 @@
 //! From a merged tally to the numbers that are written, once, for every file.
 //!
 //! A tally holds the random part only. Here the part known without error is added, Student's quantile for the
-//! number of batches is applied, and every bin gets its [`Status`]. Nothing else in the program does this.
+//! number of batches is applied, and every bin gets its [`Status`]. Goals are judged by the same estimates
+//! ([`Estimate::with_fixed`]).
 
 use crate::farm::merge::{Merged, SetResult};
 use crate::farm::plan::Plan;
@@ -177,20 +178,20 @@ struct Rule {
 
 impl Rule {
     fn apply(&self, raw: impl Iterator<Item = Raw>, fixed_direct: &[f64]) -> Vec<Bin> {
-        let known = |(i, raw): (usize, Raw)| self.bin(&raw, fixed_direct.get(i).copied().unwrap_or(0.0));
+        let known = |(i, raw): (usize, Raw)| self.bin(&raw, fixed_direct, i);
         let bins: Vec<Bin> = raw.enumerate().map(known).collect();
         assert!(fixed_direct.is_empty() || fixed_direct.len() == bins.len(), "direct light of another set");
         bins
     }
 
-    fn bin(&self, raw: &Raw, fixed: f64) -> Bin {
-        if fixed.is_nan() {
+    fn bin(&self, raw: &Raw, fixed_direct: &[f64], i: usize) -> Bin {
+        let Some(estimate) = raw.estimate.with_fixed(fixed_direct, i) else {
             return Bin::unknown(Status::NoReceiver);
-        }
-        if raw.estimate.n == 0 {
+        };
+        if estimate.n == 0 {
             return Bin::unknown(Status::NoInformation);
         }
-        let estimate = raw.estimate.shifted(fixed);
+        let fixed = fixed_direct.get(i).copied().unwrap_or(0.0);
         let (low, high) = estimate.interval(self.quantile);
         Bin {
             value: estimate.mean,

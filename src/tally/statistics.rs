@@ -41,6 +41,13 @@ impl Estimate {
         Estimate { mean: self.mean + offset, ..self }
     }
 
+    /// The estimate of bin `bin` of which this is the random part: `fixed` is the part without error, one entry a bin,
+    /// NaN where there is no receiver, or empty for zero everywhere. None without a receiver.
+    pub fn with_fixed(self, fixed: &[f64], bin: usize) -> Option<Self> {
+        let offset = fixed.get(bin).copied().unwrap_or(0.0);
+        (!offset.is_nan()).then(|| self.shifted(offset))
+    }
+
     /// Standard error over the size of the mean.
     pub fn relative_error(self) -> f64 {
         self.standard_error / self.mean.abs()

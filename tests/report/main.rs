@@ -5,6 +5,7 @@ mod maps;
 mod tables;
 mod whole;
 
+use lampyris::farm::merge::goal::{Look, Stopped};
 use lampyris::farm::merge::{Merged, SetResult};
 use lampyris::farm::plan::{Input, Plan, SceneSummary};
 use lampyris::job::Job;
@@ -121,6 +122,8 @@ fn merged(n: u64) -> Merged {
         flux: flux(n),
         batches: n,
         missing: Vec::new(),
+        stopped: None,
+        looks: Vec::new(),
         seconds: 4.0,
     }
 }

@@ -87,7 +87,12 @@ impl Plan {
             }
             None => {
                 let value = format!("{} ({} of batch scores)", self.job.run.batches, human(kept));
-                Err(Error::input(file, "run.batches", value, format!("{limit}; take fewer batches of more histories")))
+                Err(Error::input(
+                    file,
+                    self.job.batches_field(),
+                    value,
+                    format!("{limit}; take fewer batches of more histories"),
+                ))
             }
         }
     }
