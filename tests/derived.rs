@@ -175,7 +175,7 @@ fn shared_errors_cancel_in_the_uniformity_and_not_in_the_minimum() {
 
 #[test]
 fn the_least_observed_mean_lies_low_and_its_jackknife_does_not_cover() {
-    // Why equation (11.4): 40 equal points, each with its own error.
+    // Why equation (11.5): 40 equal points, each with its own error.
     let (mut bias, mut covered) = (0.0, 0);
     for replicate in 0..REPLICATES {
         let scores = grid(&[1.0; 40], 0.0, 0.2, &mut generator("naive", replicate));
