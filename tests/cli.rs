@@ -127,7 +127,7 @@ fn bad_values_in_a_job_are_named_with_field_value_and_range() {
         ),
         ("name = \"floor\"", "name = \"view\"", "name = view: a name used only once"),
         ("name = \"floor\"", "name = \"../floor\"", "name = ../floor: 1 .. 64 letters, digits"),
-        ("name = \"floor\"", "name = \"summary\"", "name = summary: any name but points, summary and flux"),
+        ("name = \"floor\"", "name = \"summary\"", "name = summary: any name but points, regions, summary and flux"),
         ("normal = [0.0, 1.0, 0.0]\ncolumns", "normal = [0, 0, 0]\ncolumns", "grid[0].normal = [0.0, 0.0, 0.0]: three"),
         ("columns = 2", "columns = 70000", "grid[0].columns = 70000: 1 .. 65536"),
         ("columns = 2\nrows = 2", "columns = 16000\nrows = 16000", "grid[0].keep_batches = true (\"floor\", with the"),
@@ -335,4 +335,57 @@ fn a_fault_that_names_no_step_is_refused() {
     assert_eq!(output.status.code(), Some(2));
     let said = String::from_utf8(output.stderr).unwrap();
     assert!(said.contains("LAMPYRIS_FAULT = sometime:1: <step>:<count> with a step among after-create"), "{said}");
+}
+
+#[test]
+fn regions_and_ratios_are_checked_as_all_else() {
+    let good = "[[region]]\nname = \"wall\"\ncamera = \"view\"\nrectangle = [1, 1, 2, 2]\n\
+                [[ratio]]\nname = \"part\"\nnumerator = \"wall\"\ndenominator = \"floor\"\n\
+                [[ratio]]\nname = \"whole\"\nnumerator = \"desk\"\ndenominator = \"floor\"\n";
+    let rectangle = "region[0].rectangle = ";
+    let cases = [
+        ("camera = \"view\"", "camera = \"eye\"", "region[0].camera = eye: the name of a [[camera]]: view"),
+        ("[1, 1, 2, 2]", "[1, 1, 4, 2]", "[1, 1, 4, 2]: column, row, columns, rows of at least one pixel inside 4 x 3"),
+        ("[1, 1, 2, 2]", "[1, 1, 0, 2]", rectangle),
+        ("[1, 1, 2, 2]", "[4294967295, 1, 4294967295, 2]", rectangle),
+        ("[1, 1, 2, 2]", "[1, 1, 2]", "invalid length 3"),
+        ("rectangle = [1, 1, 2, 2]", "", "region[0] = (both or neither): either rectangle or node"),
+        ("[1, 1, 2, 2]", "[1, 1, 2, 2]\nnode = \"Table\"", "region[0] = (both or neither): either rectangle or node"),
+        ("rectangle = [1, 1, 2, 2]", "node = \"Table\"", "region[0].node = Table: a node only with a scene"),
+        ("name = \"wall\"", "name = \"regions\"", "name = regions: any name but points, regions, summary and flux"),
+        ("name = \"wall\"", "name = \"desk\"", "name = desk: a name used only once"),
+        ("name = \"part\"", "name = \"a/b\"", "ratio[0].name = a/b: 1 .. 64 letters, digits, '_' or '-'"),
+        ("name = \"whole\"", "name = \"Part\"", "ratio[1].name = Part: a name used for only one ratio"),
+        (
+            "numerator = \"wall\"",
+            "numerator = \"view\"",
+            "ratio[0].numerator = view: a grid with keep_batches, a point",
+        ),
+        ("denominator = \"floor\"", "denominator = \"no\"", "a point or a region: floor, desk, wall"),
+        ("denominator = \"floor\"", "", "missing field `denominator`"),
+    ];
+    let folder = folder_with(&format!("{JOB}{good}"));
+    expect(folder.path(), 0, &["plan", "job.toml", "-o", "out"]);
+    for (from, to, fragment) in cases {
+        assert!(good.contains(from), "{from}");
+        let folder = folder_with(&format!("{JOB}{}", good.replacen(from, to, 1)));
+        let said = expect(folder.path(), 2, &["plan", "job.toml", "-o", "out"]);
+        assert!(said.contains(fragment) && said.contains("job.toml"), "{to}\n  expected {fragment}\n  said {said}");
+    }
+}
+
+#[test]
+fn ratios_may_change_after_the_fact_and_regions_may_not() {
+    let region = "[[region]]\nname = \"wall\"\ncamera = \"view\"\nrectangle = [1, 1, 2, 2]\n";
+    let ratio = "[[ratio]]\nname = \"r\"\nnumerator = \"wall\"\ndenominator = \"floor\"\n";
+    let folder = folder_with(&format!("{JOB}{region}"));
+    let at = folder.path();
+    expect(at, 0, &["run", "job.toml", "-o", "out", "-q"]);
+    fs::write(at.join("more.toml"), format!("{JOB}{region}{ratio}")).unwrap();
+    let said = expect(at, 0, &["run", "more.toml", "-o", "out", "-q"]);
+    assert!(said.contains("all 4 batches were done before") && said.contains("r: wall / floor = "), "{said}");
+    assert!(said.contains("    wall: mean ") && at.join("out/regions.csv").exists(), "{said}");
+    fs::write(at.join("other.toml"), format!("{JOB}{}", region.replace("[1, 1, 2, 2]", "[0, 1, 2, 2]"))).unwrap();
+    let said = expect(at, 2, &["run", "other.toml", "-o", "out", "-q"]);
+    assert!(said.contains("region[0].rectangle: [1,1,2,2] in the plan, [0,1,2,2] now"), "{said}");
 }

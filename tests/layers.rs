@@ -18,9 +18,10 @@ const LAYERS: [&[&str]; 8] = [
 ];
 
 /// Inside `farm`, lowest first; modules of one row do not know each other.
-const FARM: [&[&str]; 7] = [
+const FARM: [&[&str]; 8] = [
     &["plan", "durable"],
     &["ordering", "receivers"],
+    &["regions"],
     &["folder", "realization", "pilot"],
     &["inputs", "checkpoint"],
     &["status"],

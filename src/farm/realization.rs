@@ -5,7 +5,8 @@
 //! Each receiver set keeps the order in which its bins share tiles, found once from the centres of its bins.
 
 use super::ordering::kd_order;
-use super::receivers::{ReceiverSet, TileScores};
+use super::receivers::{CentreSight, ReceiverSet, TileScores};
+use super::regions::Regions;
 use crate::job::{Channels, Job, Sampling};
 use crate::random::sobol::PointSet;
 use crate::random::{Domain, Stream};
@@ -23,7 +24,9 @@ const HISTORIES_AT_ONCE: u64 = 64;
 pub struct Realization<'a> {
     job: &'a Job,
     scene: &'a Scene,
+    /// All receiver sets but the regions, which come last.
     sets: Vec<ReceiverSet>,
+    regions: Regions,
     /// For each set its bins in the order in which they share tiles.
     orders_of_bins: Vec<Vec<u32>>,
     fixed_direct: Vec<Vec<f64>>,
@@ -37,11 +40,14 @@ impl<'a> Realization<'a> {
     pub fn new(job: &'a Job, scene: &'a Scene, bounds: &[f64]) -> Self {
         let sets = ReceiverSet::all(job, scene, bounds);
         let orders_of_bins = sets.iter().map(|s| order_of_bins(s, scene)).collect();
-        let fixed_direct = sets.iter().map(|s| fixed_direct(s, scene)).collect();
+        let regions = Regions::place(job, scene, "", centres).expect("regions were placed when the job was planned");
+        let mut fixed_direct: Vec<Vec<f64>> = sets.iter().map(|s| fixed_direct(s, scene)).collect();
+        // A map has no direct light that is the same in every batch, and so has no region.
+        fixed_direct.resize_with(sets.len() + regions.len(), Vec::new);
         let trajectories = Stream::new(job.run.seed, Domain::Trajectory, "");
         let scrambling = Stream::new(job.run.seed, Domain::Scrambling, "");
         let orders = 1..u32::MAX;
-        Realization { job, scene, sets, orders_of_bins, fixed_direct, trajectories, scrambling, orders }
+        Realization { job, scene, sets, regions, orders_of_bins, fixed_direct, trajectories, scrambling, orders }
     }
 
     /// The same realization with only the vertices x_n, n in `orders`, connected: for tests order by order.
@@ -59,7 +65,8 @@ impl<'a> Realization<'a> {
     pub fn batch(&self, index: u64) -> BatchScores {
         let (histories, flux) = self.trace(index);
         let sets = self.sets.par_iter().zip(&self.orders_of_bins);
-        let scores = sets.map(|(set, order)| self.score(set, order, index, &histories)).collect();
+        let mut scores: Vec<Scores> = sets.map(|(set, order)| self.score(set, order, index, &histories)).collect();
+        scores.extend(self.regions.scores(&scores));
         BatchScores { sets: scores, flux: flux.scores(1.0 / self.job.run.histories_per_batch as f64) }
     }
 
@@ -118,6 +125,11 @@ impl<'a> Realization<'a> {
         }
         scores
     }
+}
+
+/// The surface seen in the centre of each pixel.
+fn centres(sight: &CentreSight) -> Vec<Option<u32>> {
+    (0..sight.pixels()).into_par_iter().map(|pixel| sight.primitive(pixel)).collect()
 }
 
 /// The bins of `set` in the order in which they share tiles.

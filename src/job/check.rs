@@ -36,9 +36,7 @@ pub(super) fn check(job: &Job, file: &str) -> Result<()> {
     for (i, region) in job.regions.iter().enumerate() {
         check_region(&c, &format!("region[{i}]"), region, job)?;
     }
-    for (i, ratio) in job.ratios.iter().enumerate() {
-        check_ratio(&c, &format!("ratio[{i}]"), ratio, job)?;
-    }
+    check_ratios(&c, job)?;
     if let Some(stop) = &job.stop {
         check_stop(&c, stop, job)?;
     }
@@ -102,6 +100,18 @@ fn check_region(c: &Checker, at: &str, region: &Region, job: &Job) -> Result<()>
     }
 }
 
+fn check_ratios(c: &Checker, job: &Job) -> Result<()> {
+    let mut seen = HashSet::new();
+    for (i, ratio) in job.ratios.iter().enumerate() {
+        let (at, name) = (format!("ratio[{i}]"), ratio.name.as_str());
+        c.name(&format!("{at}.name"), name)?;
+        let new = seen.insert(name.to_ascii_lowercase());
+        c.that(&format!("{at}.name"), name, new, "a name used for only one ratio")?;
+        check_ratio(c, &at, ratio, job)?;
+    }
+    Ok(())
+}
+
 fn check_ratio(c: &Checker, at: &str, ratio: &Ratio, job: &Job) -> Result<()> {
     let kept: Vec<String> = job.sets().into_iter().filter(|s| s.kept == Kept::EveryBatch).map(|s| s.name).collect();
     let allowed = format!("a grid with keep_batches, a point or a region: {}", kept.join(", "));
@@ -160,12 +170,10 @@ fn check_names(c: &Checker, job: &Job) -> Result<()> {
     c.that("receivers", sets.len(), !sets.is_empty(), "at least one [[camera]], [[grid]], [[point]] or [[gonio]]")?;
     for set in &sets {
         let name = set.name.as_str();
-        let plain = |b: u8| b.is_ascii_alphanumeric() || b == b'_' || b == b'-';
-        let fits = (1..=64).contains(&name.len()) && name.bytes().all(plain);
-        c.that("name", name, fits, "1 .. 64 letters, digits, '_' or '-'")?;
-        // Results are files named after their sets; `points.csv` and `summary.json` are already taken.
-        let free = !["points", "summary", "flux"].contains(&name);
-        c.that("name", name, free, "any name but points, summary and flux")?;
+        c.name("name", name)?;
+        // Results are files named after their sets; `points.csv`, `regions.csv` and `summary.json` are already taken.
+        let free = !["points", "regions", "summary", "flux"].contains(&name);
+        c.that("name", name, free, "any name but points, regions, summary and flux")?;
         c.that("name", name, seen.insert(name.to_ascii_lowercase()), "a name used only once")?;
     }
     Ok(())
@@ -254,6 +262,12 @@ struct Checker<'a> {
 impl Checker<'_> {
     fn that(&self, field: &str, value: impl ToString, holds: bool, allowed: &str) -> Result<()> {
         if holds { Ok(()) } else { Err(Error::input(self.file, field, value, allowed)) }
+    }
+
+    fn name(&self, field: &str, name: &str) -> Result<()> {
+        let plain = |b: u8| b.is_ascii_alphanumeric() || b == b'_' || b == b'-';
+        let fits = (1..=64).contains(&name.len()) && name.bytes().all(plain);
+        self.that(field, name, fits, "1 .. 64 letters, digits, '_' or '-'")
     }
 
     fn range(&self, field: &str, value: u64, low: u64, high: u64) -> Result<()> {

@@ -1,5 +1,6 @@
 //! Illuminance as tables: one row for each grid point or lux-meter, every number with all its digits.
 
+use super::derived::{family_interval, quantile_of};
 use super::values::{Bin, FEW_BATCHES, SetValues, Status};
 use crate::farm::merge::Merged;
 use crate::farm::plan::Plan;
@@ -25,15 +26,26 @@ const HEADER: [&str; 16] = [
     "note",
 ];
 
+/// Of grids alone, before `vov`: ends of intervals that hold for every point of the grid together.
+const FAMILY: [&str; 2] = ["family_lower_lx", "family_upper_lx"];
+
+/// Place of `FAMILY` in a row: before the last two columns.
+const FAMILY_AT: usize = HEADER.len() - 2;
+
 /// Writes the grid `values`, row-major, column fastest.
 pub(super) fn write_grid(plan: &Plan, merged: &Merged, values: &SetValues, to: &mut impl Write) -> Result<()> {
     let grid = plan.job.grids.iter().find(|g| g.name == values.shape.name).expect("a set comes from its job");
     let mut table = ::csv::Writer::from_writer(to);
-    table.write_record(HEADER)?;
+    let mut header = HEADER.to_vec();
+    header.splice(FAMILY_AT..FAMILY_AT, FAMILY);
+    table.write_record(header)?;
+    let quantile = quantile_of(values, plan.job.run.confidence, merged.batches);
     let columns = values.shape.width as usize;
     for (index, bin) in values.bins.iter().enumerate() {
         let place = [index, index % columns, index / columns];
-        table.write_record(row(place, grid.position(index), grid.normal, bin, &note(bin, merged)))?;
+        let mut row = row(place, grid.position(index), grid.normal, bin, &note(bin, merged));
+        row.splice(FAMILY_AT..FAMILY_AT, family_interval(bin, quantile).map(|x| format!("{x:?}")));
+        table.write_record(row)?;
     }
     table.flush()
 }
@@ -60,7 +72,7 @@ fn row(place: [usize; 3], position: [f64; 3], normal: [f64; 3], bin: &Bin, note:
 }
 
 /// What a reader must know before using the numbers of `bin`.
-fn note(bin: &Bin, merged: &Merged) -> String {
+pub(super) fn note(bin: &Bin, merged: &Merged) -> String {
     if bin.status == Status::NoReceiver {
         return "inside".to_owned();
     }

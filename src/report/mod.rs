@@ -5,8 +5,10 @@
 //! | `<camera>.exr`, `<gonio>.exr` | luminance map: `R,G,B`, `luminance.*`, `direct.Y`, see below |
 //! | `<grid>.csv` | illuminance, one row for each grid point, row-major |
 //! | `points.csv` | the same for all lux-meters `[[point]]`, with their names |
+//! | `regions.csv` | mean luminance of every `[[region]]` |
 //! | `<name>.png` | false-colour picture of a camera, goniometer or grid and of its relative error |
-//! | `summary.json` | one line of statistics for each receiver set, flux balance, timings, what ended the run, digest of all numbers |
+//! | `summary.json` | one line of statistics for each receiver set, what is derived from several bins, flux
+//!   balance, timings, what ended the run, digest of all numbers |
 //!
 //! Channels of an EXR file, 32-bit float, row 0 on top, \[cd/m2\] except where said:
 //!
@@ -25,9 +27,12 @@
 
 mod canvas;
 mod csv;
+mod derived;
+mod derived_text;
 mod exr;
 mod number;
 mod png;
+mod regions;
 mod scale;
 mod stopping;
 mod summary;
@@ -53,23 +58,26 @@ use values::SetValues;
 pub fn write(plan: &Plan, merged: &Merged, dir: &Path) -> Result<()> {
     std::fs::create_dir_all(dir).map_err(Error::io(dir))?;
     let mut collector = Collector::new(plan, merged);
-    let mut points = Vec::new();
+    let (mut points, mut regions) = (Vec::new(), Vec::new());
     for values in SetValues::all(plan, merged) {
         collector.add(&values);
-        if values.shape.kind == ReceiverKind::Point {
-            points.push(values);
-        } else {
-            write_set(plan, merged, &values, dir)?;
+        match values.shape.kind {
+            ReceiverKind::Point => points.push(values),
+            ReceiverKind::Region => regions.push(values),
+            ReceiverKind::Camera | ReceiverKind::Gonio | ReceiverKind::Grid => write_set(plan, merged, &values, dir)?,
         }
     }
     if !points.is_empty() {
         replace(&dir.join("points.csv"), |to| csv::write_points(plan, merged, &points, to))?;
     }
+    if !regions.is_empty() {
+        replace(&dir.join("regions.csv"), |to| regions::write(plan, merged, &regions, to))?;
+    }
     let summary = collector.finish();
     replace(&dir.join("summary.json"), |to| summary::write_json(&summary, to))
 }
 
-/// The files of one receiver set that is not a point.
+/// The files of one receiver set that is neither point nor region.
 fn write_set(plan: &Plan, merged: &Merged, values: &SetValues, dir: &Path) -> Result<()> {
     let name = &values.shape.name;
     if values.shape.kind == ReceiverKind::Grid {

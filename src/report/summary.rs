@@ -1,6 +1,7 @@
 //! `summary.json`: what a whole receiver set says in a line, the flux balance, timings, and a digest by which two
 //! runs are compared. A number that is not finite is `null`.
 
+use super::derived::{OfRatio, OfSet, of_set, ratios};
 use super::stopping::StoppedBy;
 use super::values::{Bin, FEW_BATCHES, SetValues, Status, kind_name, unit};
 use crate::farm::merge::Merged;
@@ -31,6 +32,7 @@ pub(super) struct Summary {
     pub seed: u64,
     pub confidence: f64,
     pub sets: Vec<SetSummary>,
+    pub ratios: Vec<OfRatio>,
     pub flux_lm: Flux,
     pub timings: Timings,
     /// Of the scene, and of these results.
@@ -59,6 +61,8 @@ pub(super) struct SetSummary {
     pub worst_relative_error: f64,
     /// 1 / (mean squared relative error x seconds of all workers) \[1/s\].
     pub figure_of_merit: f64,
+    #[serde(flatten)]
+    pub of_set: OfSet,
 }
 
 /// A number with its error.
@@ -109,7 +113,8 @@ impl<'a> Collector<'a> {
 
     /// Takes in the next receiver set in job order.
     pub fn add(&mut self, values: &SetValues) {
-        self.sets.push(SetSummary::new(values, self.merged.seconds));
+        let derived = of_set(self.plan, self.merged, self.sets.len(), &values.shape);
+        self.sets.push(SetSummary::new(values, self.merged.seconds, derived));
         let shape = &values.shape;
         self.hasher.update(shape.name.as_bytes());
         self.hasher.update(&shape.width.to_le_bytes()).update(&shape.height.to_le_bytes());
@@ -143,6 +148,7 @@ impl<'a> Collector<'a> {
             confidence: run.confidence,
             warnings: warnings(plan, merged, &flux, &self.sets),
             sets: self.sets,
+            ratios: ratios(plan, merged),
             flux_lm: flux,
             timings: Timings {
                 worker_seconds: merged.seconds,
@@ -162,7 +168,7 @@ impl<'a> Collector<'a> {
 }
 
 impl SetSummary {
-    fn new(values: &SetValues, seconds: f64) -> Self {
+    fn new(values: &SetValues, seconds: f64, of_set: OfSet) -> Self {
         let bins = &values.bins;
         let count = |status| bins.iter().filter(|b| b.status == status).count();
         let found = || bins.iter().map(|b| b.value).filter(|x| x.is_finite());
@@ -182,6 +188,7 @@ impl SetSummary {
             median_relative_error: median(errors()),
             worst_relative_error: errors().fold(f64::NAN, f64::max),
             figure_of_merit: figure_of_merit(mean(errors().map(|r| r * r)).sqrt(), seconds),
+            of_set,
         }
     }
 }

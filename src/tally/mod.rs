@@ -5,10 +5,12 @@
 //! A tally is an ordered left fold, so equal batches in equal order give equal bits. It does not know what
 //! quantity it counts nor where its bins lie.
 
+pub mod derived;
 mod moments;
 mod monitor;
 mod replicates;
 pub mod statistics;
+mod student;
 
 pub use moments::{MomentBlock, Moments};
 pub use monitor::Watched;

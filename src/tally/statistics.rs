@@ -1,5 +1,6 @@
 //! From batch scores to estimates, intervals and figures of merit (docs/method.md, "Statistics").
 
+use super::student::{MANY, tail_quantile};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// The number with its error: mean of batch scores and standard error of that mean.
@@ -68,6 +69,9 @@ impl Estimate {
 pub fn student_quantile(confidence: f64, n: u64) -> f64 {
     if n < 2 {
         return f64::NAN;
+    }
+    if (n - 1) as f64 >= MANY {
+        return tail_quantile(0.5 * (1.0 - confidence), n);
     }
     let student = StudentsT::new(0.0, 1.0, (n - 1) as f64).expect("scale and freedom are positive");
     let quantile = student.inverse_cdf(0.5 + 0.5 * confidence);

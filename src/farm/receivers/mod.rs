@@ -5,8 +5,10 @@
 //! without extent is computed once. How histories are turned into scores is in `local`.
 
 mod local;
+mod sight;
 
 pub use local::TileScores;
+pub use sight::CentreSight;
 
 use crate::error::{Error, Result};
 use crate::job::{Camera, Job, SetShape};
