@@ -9,7 +9,7 @@ pub struct Estimate {
     pub n: u64,
     /// Mean of the batch scores; NaN for n = 0.
     pub mean: f64,
-    /// Standard error of the mean, sqrt(M2 / (n (n-1))); NaN below n = 2 and where nothing ever scored.
+    /// Standard error of the mean, sqrt(M2 / (n (n-1))); NaN below n = 2 and without information.
     pub standard_error: f64,
 }
 
@@ -39,6 +39,11 @@ impl Estimate {
     /// The same estimate with the constant `offset` added: a part known without error.
     pub fn shifted(self, offset: f64) -> Self {
         Estimate { mean: self.mean + offset, ..self }
+    }
+
+    /// The same estimate with the error NaN unless `informed`.
+    pub fn or_no_error(self, informed: bool) -> Self {
+        if informed { self } else { Estimate { standard_error: f64::NAN, ..self } }
     }
 
     /// Standard error over the size of the mean.

@@ -10,7 +10,7 @@ use super::folder::Folder;
 use super::plan::Plan;
 use crate::error::{Error, Result};
 use crate::job::{Kept, SetShape};
-use crate::tally::{FLUX_BINS, MomentBlock, Replicates};
+use crate::tally::{FLUX_BINS, MomentBlock, Monitor, Replicates};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -41,6 +41,8 @@ pub enum SetResult {
 pub struct Merged {
     /// One for each receiver set in job order.
     pub sets: Vec<SetResult>,
+    /// For each receiver set its monitored bins, in their order.
+    pub monitors: Vec<Vec<Monitor>>,
     /// Flux balance, every batch.
     pub flux: Replicates,
     /// Batches merged.
@@ -158,6 +160,7 @@ struct Fold<'a> {
     plan: &'a Plan,
     shapes: Vec<SetShape>,
     sets: Vec<SetFold>,
+    monitors: Vec<Vec<Monitor>>,
     flux: Replicates,
     /// Direct light of every set with the file and the checksums it was taken from.
     fixed: Option<(PathBuf, Vec<Checksum>, Vec<Vec<f64>>)>,
@@ -180,8 +183,9 @@ impl<'a> Fold<'a> {
             Kept::EveryBatch => SetFold::Replicates(Replicates::new(shape.bins())),
         };
         let sets = shapes.iter().map(empty).collect();
+        let monitors = shapes.iter().map(Monitor::of_set).collect();
         let flux = Replicates::new(FLUX_BINS.len());
-        Fold { plan, shapes, sets, flux, fixed: None, batches: 0, seconds: 0.0, done: Vec::new() }
+        Fold { plan, shapes, sets, monitors, flux, fixed: None, batches: 0, seconds: 0.0, done: Vec::new() }
     }
 
     /// Folds in the next shard.
@@ -203,6 +207,10 @@ impl<'a> Fold<'a> {
                 }
                 SetFold::Replicates(scores) => scores.append(reader.replicates(set)?),
             }
+        }
+        for (set, monitors) in self.monitors.iter_mut().enumerate() {
+            let next = reader.monitors(set)?;
+            monitors.iter_mut().zip(next).for_each(|(monitor, next)| monitor.append(next));
         }
         self.flux.append(reader.flux()?);
         let start = self.plan.shard(shard).start;
@@ -244,7 +252,7 @@ impl<'a> Fold<'a> {
             SetFold::Replicates(scores) => SetResult::Replicates { scores, fixed_direct },
         });
         let sets = sets.collect();
-        Merged { sets, flux: self.flux, batches: self.batches, missing, seconds: self.seconds }
+        Merged { sets, monitors: self.monitors, flux: self.flux, batches: self.batches, missing, seconds: self.seconds }
     }
 }
 
