@@ -1,6 +1,7 @@
 //! What is written is what was counted: every file of a results folder is read back and compared with a tally made
 //! by hand.
 
+mod health;
 mod maps;
 mod tables;
 mod whole;
