@@ -185,7 +185,7 @@ mod tests {
             let (width, height) = (1, 1);
             let shape =
                 SetShape { name: "x".into(), kind: ReceiverKind::Grid, width, height, kept, monitored: Vec::new() };
-            let mut tally = Tally::new(&[shape.clone()]);
+            let mut tally = Tally::new(std::slice::from_ref(&shape));
             for index in 0..20 {
                 let mut s = Scores::zero(&shape);
                 (s.value[0], s.direct[0], s.peak[0], s.existed[0]) = batch(index);

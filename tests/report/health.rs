@@ -1,6 +1,7 @@
 //! Marks of intervals that should not be trusted, in every file, and the label of plain estimates.
 
 use super::*;
+use lampyris::math::pow;
 
 /// A result of 64 batches whose map has bins with each mark a map can have.
 fn suspicious() -> Merged {
@@ -93,7 +94,7 @@ fn a_slow_tail_of_a_lux_meter_is_marked_everywhere() {
     result.sets[3] = SetResult::Replicates { scores: steep, fixed_direct: Vec::new() };
     // Survival t^(-3/2): the totals of an edge pixel in the plain estimate.
     let monitor = &mut result.monitors[3][0];
-    monitor.largest = (0..200).map(|i| ((f64::from(i) + 0.5) / 200.0).powf(-2.0 / 3.0)).collect();
+    monitor.largest = (0..200).map(|i| pow((f64::from(i) + 0.5) / 200.0, -2.0 / 3.0)).collect();
     let dir = written(&plan(JOB), &result);
     let meter = &summary(dir.path())["monitored"][0];
     assert!((meter["slope"].as_f64().unwrap() - 2.5).abs() < 0.3, "{}", meter["slope"]);
