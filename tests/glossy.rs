@@ -142,7 +142,8 @@ fn connect_plainly(case: &Case, histories: &Connectors, receivers: &[Receiver]) 
     let tile = Tile::new(&case.scene, links, 0);
     let rule = Rule { bound: f64::INFINITY, channels: 1, orders: 0..u32::MAX };
     let mut connected = vec![Connected::default(); receivers.len()];
-    connect(&case.scene, histories, 0..histories.histories(), &[&tile], &rule, &mut connected);
+    let start = vec![Colour::BLACK; receivers.len()];
+    connect(&case.scene, histories, 0..histories.histories(), &[&tile], &rule, &start, &mut connected);
     connected
 }
 

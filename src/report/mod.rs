@@ -20,9 +20,13 @@
 //! | `luminance.standardError` | of that mean |
 //! | `luminance.ciLower`, `luminance.ciUpper` | Student's interval at the confidence of the job, not clamped at 0 |
 //! | `luminance.peak` | largest single history over the sum of all \[1\], direct light left out |
+//! | `luminance.health` | 0, or why the interval should not be trusted: a sum of codes \[1\] |
 //! | `direct.Y` | the part of `luminance.Y` that is emitted or reflected once (L0 + K L0) |
 //!
-//! NaN stands wherever nothing is known: no receiver, no batch, no score. The report turns counted numbers into
+//! Codes of the health: 1 no information, 2 few batches, 4 relative error, 8 peak, 16 vov (not in maps), 32 tail, 64
+//! checks; `tally::health` says when each is set. The note of a table has the same words.
+//!
+//! NaN stands wherever nothing is known: no receiver, no batch, no history that reached it. The report turns counted numbers into
 //! files; how they were produced it does not know, and it never recomputes them.
 
 mod canvas;
@@ -30,6 +34,7 @@ mod csv;
 mod derived;
 mod derived_text;
 mod exr;
+mod health;
 mod number;
 mod png;
 mod regions;

@@ -29,7 +29,7 @@ pub(super) fn write(plan: &Plan, merged: &Merged, regions: &[SetValues], to: &mu
         // Debug prints the shortest text that reads back to the same bits.
         let numbers = numbers.map(|x| format!("{x:?}"));
         let names = [region.name.clone(), region.camera.clone()];
-        table.write_record(names.iter().chain(&numbers).chain([&note(bin, merged)]))?;
+        table.write_record(names.iter().chain(&numbers).chain([&note(bin, plan, merged)]))?;
     }
     table.flush()
 }

@@ -90,6 +90,7 @@ pub struct Scene {
     surfaces: Vec<Surface>,
     surface_of: Vec<u32>,
     has_peaks: bool,
+    reflects: bool,
 }
 
 impl Scene {
@@ -134,9 +135,11 @@ impl Scene {
             return Err(Error::input("scene", "luminous flux", flux, allowed));
         }
         let cameras = model.cameras.into_iter().map(|c| CameraNode { eye: c.eye + offset, ..c }).collect();
-        let has_peaks = surface_of.iter().any(|&s| surfaces[s as usize].reflectance.is_peaked());
+        let used = || surface_of.iter().map(|&s| &surfaces[s as usize].reflectance);
+        let has_peaks = used().any(Reflectance::is_peaked);
+        let reflects = used().any(|r| !r.is_black());
         let nodes = model.nodes;
-        Ok(Scene { geometry, sources, cameras, nodes, warnings, offset, surfaces, surface_of, has_peaks })
+        Ok(Scene { geometry, sources, cameras, nodes, warnings, offset, surfaces, surface_of, has_peaks, reflects })
     }
 
     /// A position of the job in the coordinates of the scene \[m\].
@@ -162,6 +165,11 @@ impl Scene {
     /// True when the side on which `hit` was met absorbs all light.
     pub fn absorbs(&self, hit: &Hit) -> bool {
         !hit.front && !self.surface(hit.primitive).double_sided
+    }
+
+    /// True when some surface reflects light that connections can carry.
+    pub fn reflects(&self) -> bool {
+        self.reflects
     }
 
     /// True when some surface reflects in a peaked lobe.

@@ -10,7 +10,7 @@
 //! statistic without batch b:
 //!
 //! ```text
-//! se^2 = (n-1)/n sum over b of (theta_(b) - mean theta_(.))^2                                           (11.4)
+//! se^2 = (n-1)/n sum over b of (theta_(b) - mean theta_(.))^2                                           (11.5)
 //! ```
 //!
 //! The value is that of all batches, not corrected for its bias: this is of the order 1/n beside an error of the order
@@ -24,13 +24,13 @@
 //! intervals \[l_i, u_i\] that hold together follows without any of this
 //!
 //! ```text
-//! min l_i <= min of the true values <= min u_i                                                         (11.5)
+//! min l_i <= min of the true values <= min u_i                                                         (11.6)
 //! ```
 //!
 //! for the least true value is some bin's, hence at least its l_i, and is at most every bin's, hence at most every u_i.
 //! Such intervals are conservative: they cover with at least the confidence asked for, and are wider than need be.
 //!
-//! Uniformity Uo = least over mean: (11.5) on the ratios E_i/mean, each by the jackknife (the errors of the two partly
+//! Uniformity Uo = least over mean: (11.6) on the ratios E_i/mean, each by the jackknife (the errors of the two partly
 //! cancel). Where the interval of a denominator contains zero, a ratio has no bounded interval (Fieller): then
 //! there is none, NaN. Fixed parts, the same in every batch, are added to means and have no error. What the bins
 //! measure, this module does not know.
@@ -76,7 +76,7 @@ pub fn family_quantile(confidence: f64, members: usize, n: u64) -> f64 {
     }
 }
 
-/// The statistic of `n` batches with its error by equation (11.4); `statistic` is given the batch to leave out.
+/// The statistic of `n` batches with its error by equation (11.5); `statistic` is given the batch to leave out.
 pub fn jackknife(n: usize, statistic: impl Fn(Option<usize>) -> f64) -> Estimate {
     let without = Estimate::from_scores((0..n).map(|batch| statistic(Some(batch))));
     // The standard error of the mean of the theta_(b) is sqrt(sum/(n(n-1))).
@@ -95,7 +95,7 @@ pub fn ratio(numerator: &Series, denominator: &Series, confidence: f64) -> Estim
     ratio
 }
 
-/// The bounds of the least of several values from intervals that hold together, equation (11.5). One unknown lower
+/// The bounds of the least of several values from intervals that hold together, equation (11.6). One unknown lower
 /// end leaves that of the least unknown; the known upper ends bound it all the same.
 pub fn least(intervals: impl Iterator<Item = (f64, f64)>) -> (f64, f64) {
     let narrower = |(low, high): (f64, f64), (l, h): (f64, f64)| {
@@ -177,13 +177,13 @@ impl<'a> Family<'a> {
         Series { scores, fixed: self.members.iter().map(|(_, fixed)| fixed).sum::<f64>() / count }
     }
 
-    /// The least of the means of the bins, by equation (11.5).
+    /// The least of the means of the bins, by equation (11.6).
     pub fn minimum(&self, confidence: f64) -> Bounded {
         let estimate = |&(bin, fixed): &(usize, f64)| self.scores.estimate(bin).shifted(fixed);
         self.bounded(confidence, self.members.iter().map(estimate))
     }
 
-    /// The least of the means of the bins over the mean of all, by equation (11.5). No interval where that of the mean
+    /// The least of the means of the bins over the mean of all, by equation (11.6). No interval where that of the mean
     /// contains zero.
     pub fn uniformity(&self, confidence: f64) -> Bounded {
         let mean = self.mean();

@@ -10,7 +10,7 @@ pub struct Estimate {
     pub n: u64,
     /// Mean of the batch scores; NaN for n = 0.
     pub mean: f64,
-    /// Standard error of the mean, sqrt(M2 / (n (n-1))); NaN below n = 2 and where nothing ever scored.
+    /// Standard error of the mean, sqrt(M2 / (n (n-1))); NaN below n = 2 and without information.
     pub standard_error: f64,
 }
 
@@ -47,6 +47,11 @@ impl Estimate {
     pub fn with_fixed(self, fixed: &[f64], bin: usize) -> Option<Self> {
         let offset = fixed.get(bin).copied().unwrap_or(0.0);
         (!offset.is_nan()).then(|| self.shifted(offset))
+    }
+
+    /// The same estimate with the error NaN unless `informed`.
+    pub fn or_no_error(self, informed: bool) -> Self {
+        if informed { self } else { Estimate { standard_error: f64::NAN, ..self } }
     }
 
     /// Standard error over the size of the mean.

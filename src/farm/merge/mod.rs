@@ -18,7 +18,7 @@ use super::plan::Plan;
 use crate::error::{Error, Result};
 use crate::job::{Kept, SetShape};
 use crate::tally::statistics::Estimate;
-use crate::tally::{FLUX_BINS, MomentBlock, Replicates};
+use crate::tally::{FLUX_BINS, MomentBlock, Monitor, Replicates};
 use choose::{Candidate, check_length, choose, common_plan};
 use goal::{Goal, Look, Stopped};
 use std::ops::Range;
@@ -50,6 +50,8 @@ pub enum SetResult {
 pub struct Merged {
     /// One for each receiver set in job order.
     pub sets: Vec<SetResult>,
+    /// For each receiver set its monitored bins, in their order.
+    pub monitors: Vec<Vec<Monitor>>,
     /// Flux balance, every batch.
     pub flux: Replicates,
     /// Batches merged.
@@ -118,6 +120,7 @@ struct Fold<'a> {
     /// Numbers of the sets that are folded; the others stay empty.
     read: Vec<usize>,
     sets: Vec<SetFold>,
+    monitors: Vec<Vec<Monitor>>,
     flux: Replicates,
     /// Direct light of every set with the file and the checksums it was taken from.
     fixed: Option<(PathBuf, Vec<Checksum>, Vec<Vec<f64>>)>,
@@ -152,10 +155,11 @@ impl<'a> Fold<'a> {
             Kept::EveryBatch => SetFold::Replicates(Replicates::new(shape.bins())),
         };
         let sets = shapes.iter().map(empty).collect();
+        let monitors = shapes.iter().map(Monitor::of_set).collect();
         let flux = Replicates::new(FLUX_BINS.len());
         let (done, looks) = (Vec::new(), Vec::new());
         let goal = Goal::of(plan);
-        Fold { plan, shapes, read, sets, flux, fixed: None, batches: 0, seconds: 0.0, done, goal, looks }
+        Fold { plan, shapes, read, sets, monitors, flux, fixed: None, batches: 0, seconds: 0.0, done, goal, looks }
     }
 
     /// Folds in the next shard.
@@ -177,6 +181,10 @@ impl<'a> Fold<'a> {
                 }
                 SetFold::Replicates(scores) => scores.append(reader.replicates(set)?),
             }
+        }
+        for (set, monitors) in self.monitors.iter_mut().enumerate() {
+            let next = reader.monitors(set)?;
+            monitors.iter_mut().zip(next).for_each(|(monitor, next)| monitor.append(next));
         }
         self.flux.append(reader.flux()?);
         let start = self.plan.shard(shard).start;
@@ -245,8 +253,9 @@ impl<'a> Fold<'a> {
             }
             SetFold::Replicates(scores) => SetResult::Replicates { scores, fixed_direct },
         });
-        let (sets, looks) = (sets.collect(), self.looks);
-        Merged { sets, flux: self.flux, batches: self.batches, missing, stopped, looks, seconds: self.seconds }
+        let (sets, looks, monitors) = (sets.collect(), self.looks, self.monitors);
+        let Fold { flux, batches, seconds, .. } = self;
+        Merged { sets, monitors, flux, batches, missing, stopped, looks, seconds }
     }
 }
 

@@ -2,8 +2,8 @@ use super::goal::relative_half_width;
 use super::*;
 use crate::farm::testing::{JOB, fixed_direct, plan, plan_of, save, save_tally, scores, tally};
 use crate::random::{Domain, Stream};
-use crate::tally::Tally;
 use crate::tally::statistics::student_quantile;
+use crate::tally::{HistoryMoments, Tally};
 
 /// Folders holding the plan and the checkpoints (shard, batches) of each list.
 fn folders(plan: &Plan, lists: &[&[(u64, u64)]]) -> (tempfile::TempDir, Vec<Folder>) {
@@ -54,7 +54,27 @@ fn the_merge_is_the_fold_over_shards_and_agrees_with_one_pass() {
             other => panic!("{other:?}"),
         }
     }
-    assert_eq!(result.flux, direct.flux);
+    assert_eq!((result.flux, result.monitors), (direct.flux, direct.monitors));
+}
+
+#[test]
+fn power_sums_of_watched_histories_do_not_depend_on_the_shards() {
+    // Shards of 4 batches and one shard of all: other random numbers would be another plan, so the tallies are made
+    // by hand from the same scores.
+    let plan = plan();
+    let (_temp, folders) = folders(&plan, &[ALL]);
+    let merged = merged(&folders).monitors[3][0].clone();
+    let mut totals: Vec<f64> = (0..10).flat_map(|b| scores(&plan, b).sets[3].watched[0].totals.clone()).collect();
+    let whole = HistoryMoments::of(&totals);
+    let sum = merged.histories.iter().fold(HistoryMoments::default(), |sum, next| sum.merged(*next));
+    assert_eq!(sum.n, 640);
+    for (a, b) in [(sum.mean, whole.mean), (sum.m2, whole.m2), (sum.m3, whole.m3), (sum.m4, whole.m4)] {
+        assert!((a - b).abs() <= 1e-12 * b.abs(), "{a} {b}");
+    }
+    totals.sort_by(|a, b| b.total_cmp(a));
+    assert_eq!(merged.largest, totals[..200]);
+    let of_batch = |b| scores(&plan, b).sets[3].value[0];
+    assert_eq!(merged.scores, (0..10).map(of_batch).collect::<Vec<_>>());
 }
 
 #[test]
