@@ -39,8 +39,10 @@
 //! Transport does not know files, threads, shards, how many histories run, nor the shape of a picture.
 
 pub mod connection;
+pub mod crossing;
 pub mod direct;
 pub mod eye;
 pub mod receiver;
+pub mod reverse;
 mod spherical_triangle;
 pub mod trajectory;

@@ -4,6 +4,9 @@
 //! drawn anew each batch, carries the connections. A lux-meter stays where it is, and its direct light from lights
 //! without extent is computed once.
 
+mod crossing;
+mod reverse;
+
 use crate::error::{Error, Result};
 use crate::job::{Camera, Job, SetShape};
 use crate::math::{DVec2, DVec3};
