@@ -131,7 +131,7 @@ fn assert_same_point_is_exact(case: &Case, meter: Receiver) {
     let response =
         Response::Reflectance { primitive: floor.primitive, to_eye, attenuation: Colour::WHITE, carried: 0.0 };
     let histories = histories(case, 256);
-    let connected = connect_plainly(&case, &histories, &[meter, Receiver { response, ..meter }]);
+    let connected = connect_plainly(case, &histories, &[meter, Receiver { response, ..meter }]);
     let (e, l) = (connected[0].sum.luminance(), connected[1].sum.luminance());
     assert!(e > 0.0 && (l / (0.37 / PI * e) - 1.0).abs() < 1e-14, "{l} and {e}");
 }

@@ -9,7 +9,7 @@ use lampyris::job::Job;
 use lampyris::random::sobol::PointSet;
 use lampyris::random::{Domain, Stream};
 use lampyris::scene::{Model, Scene, gltf};
-use lampyris::transport::trajectory::trace;
+use lampyris::transport::trajectory::{Vertex, trace};
 use nix::time::{ClockId, clock_gettime};
 use std::time::Duration;
 
@@ -34,7 +34,7 @@ fn bench(name: &str, side: u32) {
     );
     let job = Job::parse(&text, "bench").expect("the job is right");
     let scene = Scene::new(load(name), &job).expect("the scene is right");
-    let mut vertices = Vec::new();
+    let mut vertices: Vec<Vertex> = Vec::new();
     let trajectories = Stream::new(job.run.seed, Domain::Trajectory, "");
     let per_history = median(|| {
         vertices.clear();

@@ -52,7 +52,20 @@ fn check_estimator(c: &Checker, job: &Job) -> Result<()> {
     let others = job.sets().into_iter().find(|s| s.kind != ReceiverKind::Grid);
     let allowed = "local or reverse: direct_simulation counts on the cells of grids, and knows no other receivers";
     let name = others.as_ref().map_or("", |s| s.name.as_str());
-    c.that("transport.estimator", format!("direct_simulation (with \"{name}\")"), others.is_none(), allowed)
+    c.that("transport.estimator", format!("direct_simulation (with \"{name}\")"), others.is_none(), allowed)?;
+    for (i, grid) in job.grids.iter().enumerate() {
+        check_cells(c, &format!("grid[{i}].normal"), grid)?;
+    }
+    Ok(())
+}
+
+/// What crosses a cell is the illuminance of its own plane, whichever way a lux-meter there would face.
+fn check_cells(c: &Checker, field: &str, grid: &Grid) -> Result<()> {
+    let across = cross(grid.u, grid.v);
+    let size = length(across);
+    let off = length(cross(across, grid.normal)) / (size * length(grid.normal));
+    let allowed = "with direct_simulation a normal across u and v, and u and v that span cells";
+    c.that(field, Shown(grid.normal), size > 1e-12 * length(grid.u) * length(grid.v) && off <= 1e-6, allowed)
 }
 
 /// With a goal the number of batches is its limit. A plan, in which the limit has been filled in, is read again.

@@ -30,6 +30,8 @@ pub enum Domain {
     Continuation,
     /// Scrambling of the quasi-random set of a batch; the index is the batch.
     Scrambling,
+    /// Paths from the receivers of one receiver set; the index is `batch * bins + bin`.
+    Reverse,
 }
 
 impl Domain {
@@ -40,6 +42,7 @@ impl Domain {
             Domain::Pilot => "lampyris 1 pilot",
             Domain::Continuation => "lampyris 1 continuation",
             Domain::Scrambling => "lampyris 1 scrambling",
+            Domain::Reverse => "lampyris 1 reverse",
         }
     }
 }

@@ -10,6 +10,9 @@ mod sight;
 pub use local::TileScores;
 pub use sight::CentreSight;
 
+mod crossing;
+mod reverse;
+
 use crate::error::{Error, Result};
 use crate::job::{Camera, Job, SetShape};
 use crate::math::{DVec2, DVec3};
