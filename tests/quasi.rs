@@ -16,6 +16,12 @@ use statrs::distribution::{Binomial, ChiSquared, ContinuousCDF, DiscreteCDF};
 /// Probability that a right program fails one comparison.
 const LEVEL: f64 = 1e-6;
 
+const TWO_32: f64 = (1u64 << 32) as f64;
+
+fn square(x: f64) -> f64 {
+    x * x
+}
+
 fn scrambling(seed: u64) -> Stream {
     Stream::new(seed, Domain::Scrambling, "")
 }
@@ -121,8 +127,7 @@ fn every_projection_of_a_set_is_the_net_that_sobol_made() {
     let points = scrambled(5, 3, m);
     let (mut kept, mut best) = (0, 0);
     for (c, d) in (0..DIMENSIONS).flat_map(|c| (0..c).map(move |d| (c, d))) {
-        let of_sobol: Vec<_> =
-            (0..1 << m).map(|i| [plain(i)[c], plain(i)[d]].map(|x| f64::from(x) / 2f64.powi(32))).collect();
+        let of_sobol: Vec<_> = (0..1 << m).map(|i| [plain(i)[c], plain(i)[d]].map(|x| f64::from(x) / TWO_32)).collect();
         let of_set: Vec<_> = points.iter().map(|p| [p[c], p[d]]).collect();
         for (a, b) in (1..m).flat_map(|a| (1..=m - a).map(move |b| (a, b))) {
             let balance = balanced(&of_sobol, a, b);
@@ -141,7 +146,7 @@ fn p_value(pairs: &[[f64; 2]], cells: usize) -> f64 {
     let cell = |x: f64| (x * cells as f64) as usize;
     pairs.iter().for_each(|[x, y]| counts[cells * cell(*x) + cell(*y)] += 1);
     let expected = pairs.len() as f64 / counts.len() as f64;
-    let chi: f64 = counts.iter().map(|&n| (f64::from(n) - expected).powi(2) / expected).sum();
+    let chi: f64 = counts.iter().map(|&n| square(f64::from(n) - expected) / expected).sum();
     1.0 - ChiSquared::new((counts.len() - 1) as f64).unwrap().cdf(chi)
 }
 
@@ -153,8 +158,8 @@ fn over_batches(m: u32, of: impl Fn(&PointSet) -> [f64; 2]) -> f64 {
 }
 
 /// `x` without its first `digits` binary digits.
-fn below(x: f64, digits: i32) -> f64 {
-    (x * 2f64.powi(digits)).fract()
+fn below(x: f64, digits: u32) -> f64 {
+    (x * (1u64 << digits) as f64).fract()
 }
 
 #[test]
@@ -186,8 +191,8 @@ fn digits_after_the_first_that_differs_are_independent() {
     let shift = Stream::new(9, Domain::Receiver, "shift");
     let shifted: Vec<_> = (0..1 << 16)
         .map(|batch| {
-            let mask = (shift.generator(batch).uniform() * 2f64.powi(32)) as u32;
-            [1, 2].map(|i| below(f64::from(plain(i)[0] ^ mask) / 2f64.powi(32), 2))
+            let mask = (shift.generator(batch).uniform() * TWO_32) as u32;
+            [1, 2].map(|i| below(f64::from(plain(i)[0] ^ mask) / TWO_32, 2))
         })
         .collect();
     assert!(p_value(&shifted, 16) < LEVEL, "a digital shift is accepted");
@@ -215,8 +220,8 @@ fn means_over_sets_are_unbiased_and_better_than_random() {
     let estimate = Estimate::from_scores((0..4096).map(mean));
     let z = (estimate.mean - 1.0) / estimate.standard_error;
     assert!(z.abs() < 5.0, "{estimate:?}: z = {z}");
-    let random = ((13.0f64 / 12.0).powi(8) - 1.0) / f64::from(1 << m);
-    let gain = random / (estimate.standard_error.powi(2) * estimate.n as f64);
+    let random = (square(square(square(13.0 / 12.0))) - 1.0) / f64::from(1 << m);
+    let gain = random / (square(estimate.standard_error) * estimate.n as f64);
     assert!(gain > 20.0, "variance smaller by {gain} only");
 }
 
@@ -234,7 +239,7 @@ fn coordinates_come_first_then_the_numbers_of_the_generator_from_the_first_on() 
     (0..100).for_each(|_| assert_eq!(with.uniform(), without.uniform()));
     // The last coordinate and a number make a pair; roulette takes numbers only.
     let (mut with, mut without) = (generator().after(NUMBERED), generator());
-    (0..DIMENSIONS - 1).for_each(|_| drop(with.uniform()));
+    assert_eq!([(); DIMENSIONS - 1].map(|()| with.uniform()), NUMBERED[..DIMENSIONS - 1]);
     assert_eq!(with.chance(0.5), without.chance(0.5));
     let pair = with.uniform2();
     assert_eq!([pair.x, pair.y], [NUMBERED[7], without.uniform()]);
@@ -271,7 +276,7 @@ fn emission_takes_the_coordinates_that_the_docs_say() {
 /// Light of one history at r = 1 m on plane 1 in Sobolev's case A by plain local estimation \[lx\].
 fn local_estimate(vertices: &[Vertex]) -> f64 {
     let upper = vertices.iter().filter(|v| v.normal.y < 0.0);
-    upper.map(|v| v.weight.luminance() * 0.5 / PI / v.position.distance_squared(DVec3::X).powi(2)).sum()
+    upper.map(|v| v.weight.luminance() * 0.5 / PI / square(v.position.distance_squared(DVec3::X))).sum()
 }
 
 /// Totals of the histories of each set of 2^m in case A, and the exact mean.
@@ -308,12 +313,12 @@ fn error_bars_from_histories_inside_a_set_are_rejected() {
     let mean = Estimate::from_scores(inside.iter().map(|e| e.mean));
     assert!(((mean.mean - truth) / mean.standard_error).abs() < 5.0, "{mean:?} against {truth}");
     // What a set really varies by, and what its histories, taken for independent, say.
-    let real = mean.standard_error.powi(2) * mean.n as f64;
-    let said = Estimate::from_scores(inside.iter().map(|e| e.standard_error.powi(2))).mean;
+    let real = square(mean.standard_error) * mean.n as f64;
+    let said = Estimate::from_scores(inside.iter().map(|e| square(e.standard_error))).mean;
     // From 16 batches, as the program does it.
     let batches: Vec<Estimate> =
         inside.chunks(BATCHES).map(|few| Estimate::from_scores(few.iter().map(|e| e.mean))).collect();
-    let right = Estimate::from_scores(batches.iter().map(|e| e.standard_error.powi(2) * BATCHES as f64));
+    let right = Estimate::from_scores(batches.iter().map(|e| square(e.standard_error) * BATCHES as f64));
     let (covered_inside, covered) = (count(&inside, |e| covers(*e, truth)), count(&batches, |e| covers(*e, truth)));
     println!("inside: variance {:.2} times the real one, {covered_inside} of {} cover", said / real, inside.len());
     println!("batches: variance {:.3} times the real one, {covered} of {EXPERIMENTS} cover", right.mean / real);

@@ -94,7 +94,8 @@ fn compare(name: &str, job: &Job, scene: &Scene, histories: u64, batches: u64) {
     });
     for ((set, random), rqmc) in job.sets().iter().zip(random).zip(rqmc) {
         let gain = random.variance.mean / rqmc.variance.mean;
-        let error = gain * random.variance.relative_error().hypot(rqmc.variance.relative_error());
+        let [a, b] = [random.variance.relative_error(), rqmc.variance.relative_error()];
+        let error = gain * (a * a + b * b).sqrt();
         let relative = rqmc.variance.mean.sqrt() / rqmc.size;
         println!("| {name} | {histories} | {} | {gain:.2} +- {error:.2} | {:.3} % |", set.name, 100.0 * relative);
     }
