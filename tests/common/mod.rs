@@ -6,10 +6,13 @@ pub mod scenes;
 use lampyris::farm::pilot::bounds;
 use lampyris::farm::realization::Realization;
 use lampyris::job::Job;
+use lampyris::photometry::Colour;
 use lampyris::scene::{Model, Scene};
 pub use lampyris::tally::statistics::Estimate;
 use lampyris::tally::statistics::student_quantile;
 use lampyris::tally::{BatchScores, FLUX_BINS};
+use lampyris::transport::connection::{self, Connected, Connectors, Link, Rule, Tile};
+use lampyris::transport::receiver::Receiver;
 use std::ops::Range;
 
 /// Probability that a right program fails a whole test, over all its comparisons.
@@ -65,6 +68,17 @@ pub fn estimates(batches: &[BatchScores]) -> Vec<Vec<Estimate>> {
     let sets = 0..batches[0].sets.len();
     let bin = |set: usize, i: usize| Estimate::from_scores(batches.iter().map(|b| b.sets[set].value[i]));
     sets.map(|set| (0..batches[0].sets[set].value.len()).map(|i| bin(set, i)).collect()).collect()
+}
+
+/// All histories connected to `receivers`, each by itself, with the bound b and nothing else: no continuation.
+pub fn connect(scene: &Scene, histories: &Connectors, bound: f64, receivers: &[Receiver]) -> Vec<Connected> {
+    let links = receivers.iter().enumerate().map(|(owner, &receiver)| Link { owner, receiver }).collect();
+    let tile = Tile::new(scene, links, 0);
+    let rule = Rule { bound, channels: 1, orders: 0..u32::MAX };
+    let start = vec![Colour::BLACK; receivers.len()];
+    let mut connected = vec![Connected::default(); receivers.len()];
+    connection::connect(scene, histories, 0..histories.histories(), &[&tile], &rule, &start, &mut connected);
+    connected
 }
 
 /// The estimate of one bin of the flux balance.
