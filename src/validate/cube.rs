@@ -1,0 +1,48 @@
+//! A cube lit from its middle: many reflections, seen point by point from the middle of a wall to beside its edge.
+
+use super::closed_forms::inverse_square;
+use super::experiment::Experiment;
+use super::reference::analytic;
+use super::scenes::{closed_box, lambert, omni, point, run};
+use super::{Case, Comparison};
+use crate::error::Result;
+use crate::math::DVec3;
+
+/// Accuracy of the indirect part of the table.
+const TABLE: f64 = 2e-4;
+
+/// The cases, in order.
+pub(super) fn cases() -> Vec<Case> {
+    let case = |name, checks, run: fn() -> Result<Vec<Comparison>>| Case {
+        theme: "Cube lit from its middle",
+        name,
+        checks,
+        reference: "direct: I h / d^3; indirect: collocation, about 1e-4, table",
+        run: Box::new(run),
+    };
+    vec![
+        case("cube/rho-0.5", "all reflections at points of a wall, rho = 0.5", || walls(0.5)),
+        case("cube/rho-0.8", "all reflections at points of a wall, rho = 0.8", || walls(0.8)),
+    ]
+}
+
+fn walls(rho: f64) -> Result<Vec<Comparison>> {
+    let places = [(0.5, 0.5), (0.25, 0.5), (0.25, 0.25), (0.1, 0.1)];
+    let mut job = run(16384, 32) + &omni([0.5; 3], 100.0);
+    for (i, (u, v)) in places.iter().enumerate() {
+        job += &point(&format!("p{i}"), [*u, 0.0, *v], [0.0, 1.0, 0.0]);
+    }
+    let experiment = Experiment::new(&job, closed_box(DVec3::ONE, &lambert(rho, 0.0)))?;
+    let indirect = experiment.estimates_of_orders(1..u32::MAX);
+    let direct = experiment.direct();
+    let mut all = Vec::new();
+    for (i, (u, v)) in places.iter().enumerate() {
+        let foot = ((u - 0.5) * (u - 0.5) + (v - 0.5) * (v - 0.5f64)).sqrt();
+        let parameters = format!("unit cube;I=100 centre;rho={rho};wall point u={u} v={v}");
+        let table = analytic("cube_central_source", &parameters, "E_indirect_lx_about_1e-4_rel");
+        let at = |what: &str| format!("{what}, ({u}, {v}), rho = {rho}");
+        all.push(Comparison::new(at("direct"), "lx", direct[i], inverse_square(100.0, 0.5, foot)[0]));
+        all.push(Comparison::new(at("indirect"), "lx", indirect[i][0], table).within(TABLE));
+    }
+    Ok(all)
+}
