@@ -10,7 +10,7 @@ use lampyris::math::{DVec3, PI, to_world};
 use lampyris::photometry::Colour;
 use lampyris::random::{Domain, Generator, Stream, cosine_hemisphere};
 use lampyris::scene::{Model, Reflectance, Scene, Surface};
-use lampyris::transport::connection::{Connectors, connect};
+use lampyris::transport::connection::{Connected, Connectors, Link, Rule, Tile, connect};
 use lampyris::transport::receiver::{Receiver, Response};
 use lampyris::transport::trajectory::trace;
 
@@ -100,7 +100,8 @@ fn orders_agree_with_a_backward_path_tracer() {
 
 #[test]
 fn lambert_receiver_is_rho_over_pi_times_the_lux_meter() {
-    let job = "[run]\nhistories_per_batch = 64\nbatches = 4\n".to_owned()
+    let run = "[run]\nhistories_per_batch = 64\nbatches = 16\n[transport]\nbounded = false\n";
+    let job = run.to_owned()
         + &spot_camera("l", [0.4, 0.9, 0.4], [0.4, 0.0, 0.4], [1.0, 0.0, 0.0])
         + &point("e", [0.4, 0.0, 0.4], [0.0, 1.0, 0.0]);
     let case = Case::new(&job, glossy_cube_with_lambert_floor());
@@ -127,11 +128,22 @@ fn assert_same_point_is_exact(case: &Case, meter: Receiver) {
     let down = Ray { origin: meter.position + 0.1 * DVec3::Y, direction: DVec3::NEG_Y };
     let floor = case.scene.geometry.closest_hit(&down).unwrap();
     let to_eye = DVec3::new(0.3, 0.8, 0.1).normalize();
-    let response = Response::Reflectance { primitive: floor.primitive, to_eye, attenuation: Colour::WHITE };
+    let response =
+        Response::Reflectance { primitive: floor.primitive, to_eye, attenuation: Colour::WHITE, carried: 0.0 };
     let histories = histories(case, 256);
-    let connected = connect(&case.scene, &histories, &[meter, Receiver { response, ..meter }], 1);
+    let connected = connect_plainly(&case, &histories, &[meter, Receiver { response, ..meter }]);
     let (e, l) = (connected[0].sum.luminance(), connected[1].sum.luminance());
     assert!(e > 0.0 && (l / (0.37 / PI * e) - 1.0).abs() < 1e-14, "{l} and {e}");
+}
+
+/// All histories connected to `receivers` without bound.
+fn connect_plainly(case: &Case, histories: &Connectors, receivers: &[Receiver]) -> Vec<Connected> {
+    let links = receivers.iter().enumerate().map(|(owner, &receiver)| Link { owner, receiver }).collect();
+    let tile = Tile::new(&case.scene, links, 0);
+    let rule = Rule { bound: f64::INFINITY, channels: 1, orders: 0..u32::MAX };
+    let mut connected = vec![Connected::default(); receivers.len()];
+    connect(&case.scene, histories, 0..histories.histories(), &[&tile], &rule, &mut connected);
+    connected
 }
 
 fn histories(case: &Case, count: u64) -> Connectors {
@@ -140,7 +152,7 @@ fn histories(case: &Case, count: u64) -> Connectors {
     for history in 0..count {
         let mut vertices = Vec::new();
         trace(&case.scene, &case.job.transport, &mut stream.generator(history), &mut vertices);
-        connectors.push(&case.scene, &vertices, &(0..u32::MAX));
+        connectors.push(&case.scene, &vertices);
     }
     connectors
 }
@@ -172,7 +184,7 @@ fn glossy_receiver_in_a_white_furnace() {
     let receiver = |&to_eye: &DVec3| Receiver {
         position: case.scene.place([0.35, 0.0, 0.45]),
         normal: DVec3::Y,
-        response: Response::Reflectance { primitive, to_eye, attenuation: Colour::WHITE },
+        response: Response::Reflectance { primitive, to_eye, attenuation: Colour::WHITE, carried: 0.0 },
     };
     let receivers: Vec<Receiver> = directions.iter().map(receiver).collect();
     let stream = Stream::new(44, Domain::Trajectory, "");
@@ -182,9 +194,9 @@ fn glossy_receiver_in_a_white_furnace() {
         for history in index * count..(index + 1) * count {
             let mut vertices = Vec::new();
             trace(&case.scene, &case.job.transport, &mut stream.generator(history), &mut vertices);
-            connectors.push(&case.scene, &vertices, &(0..u32::MAX));
+            connectors.push(&case.scene, &vertices);
         }
-        let connected = connect(&case.scene, &connectors, &receivers, 1);
+        let connected = connect_plainly(&case, &connectors, &receivers);
         connected.iter().map(|c| c.sum.luminance() / count as f64).collect::<Vec<_>>()
     };
     let scores: Vec<Vec<f64>> = (0..batches).map(batch).collect();

@@ -71,7 +71,7 @@ impl<'a> Realization<'a> {
         let mut connectors = Connectors::default();
         let mut flux = FluxBalance::default();
         for (vertices, balance) in traced.iter().flatten() {
-            connectors.push(self.scene, vertices, &self.orders);
+            connectors.push(self.scene, vertices);
             flux.add(balance);
         }
         (connectors, flux)
@@ -90,11 +90,12 @@ impl<'a> Realization<'a> {
     /// The scores of one receiver set.
     fn score(&self, set: &ReceiverSet, order: &[u32], batch: u64, histories: &Connectors) -> Scores {
         let channels = if self.job.run.channels == Channels::Rgb { 3 } else { 1 };
+        let rule = (channels, &self.orders);
         let tiles: Vec<TileScores> =
-            order.par_chunks(TILE).map(|bins| set.score_tile(self.scene, bins, batch, histories, channels)).collect();
+            order.par_chunks(TILE).map(|bins| set.score_tile(self.scene, bins, batch, histories, rule)).collect();
         let mut scores = Scores::zero(set.shape());
         for (bins, tile) in order.chunks(TILE).zip(tiles) {
-            tile.scatter(bins, &mut scores);
+            tile.scatter(bins, &set.shape().monitored, &mut scores);
         }
         scores
     }

@@ -16,18 +16,18 @@ use obvhs::ray::{Ray as BoxRay, RayHit};
 /// Triangles and their hierarchy.
 pub struct Mesh {
     /// In the order of the leaves of the hierarchy.
-    triangles: Vec<Triangle>,
+    pub(super) triangles: Vec<Triangle>,
     /// Where each primitive stands in `triangles`.
     place: Vec<u32>,
-    bvh: Bvh2,
+    pub(super) bvh: Bvh2,
     bounds: (DVec3, DVec3),
     /// The bounds and a little around them, where rays may start.
     near: (DVec3, DVec3),
 }
 
 /// A triangle as rays meet it: (normal, x) = offset on its plane.
-struct Triangle {
-    corners: [Vec3; 3],
+pub(super) struct Triangle {
+    pub(super) corners: [Vec3; 3],
     primitive: u32,
     normal: DVec3,
     offset: f64,

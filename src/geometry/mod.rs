@@ -11,6 +11,7 @@
 
 mod mesh;
 mod plane;
+mod proximity;
 mod sphere;
 
 pub use mesh::Mesh;

@@ -7,7 +7,7 @@ use crate::math::{DVec3, Vec3};
 #[derive(Clone, Debug)]
 pub struct Plane {
     point: DVec3,
-    normal: DVec3,
+    pub(super) normal: DVec3,
 }
 
 impl Plane {
@@ -17,7 +17,7 @@ impl Plane {
     }
 
     /// Signed distance of `p`, positive in front \[m\].
-    fn height(&self, p: DVec3) -> f64 {
+    pub(super) fn height(&self, p: DVec3) -> f64 {
         self.normal.dot(p - self.point)
     }
 

@@ -83,6 +83,7 @@ pub struct Scene {
     offset: DVec3,
     surfaces: Vec<Surface>,
     surface_of: Vec<u32>,
+    has_peaks: bool,
 }
 
 impl Scene {
@@ -127,7 +128,8 @@ impl Scene {
             return Err(Error::input("scene", "luminous flux", flux, allowed));
         }
         let cameras = model.cameras.into_iter().map(|c| CameraNode { eye: c.eye + offset, ..c }).collect();
-        Ok(Scene { geometry, sources, cameras, warnings, offset, surfaces, surface_of })
+        let has_peaks = surface_of.iter().any(|&s| surfaces[s as usize].reflectance.is_peaked());
+        Ok(Scene { geometry, sources, cameras, warnings, offset, surfaces, surface_of, has_peaks })
     }
 
     /// A position of the job in the coordinates of the scene \[m\].
@@ -145,9 +147,19 @@ impl Scene {
         &self.surfaces[self.surface_of[primitive as usize] as usize]
     }
 
+    /// Number of primitives: triangles, spheres, planes.
+    pub fn primitives(&self) -> u32 {
+        self.surface_of.len() as u32
+    }
+
     /// True when the side on which `hit` was met absorbs all light.
     pub fn absorbs(&self, hit: &Hit) -> bool {
         !hit.front && !self.surface(hit.primitive).double_sided
+    }
+
+    /// True when some surface reflects in a peaked lobe.
+    pub fn has_peaks(&self) -> bool {
+        self.has_peaks
     }
 
     /// Number of triangles.
@@ -219,6 +231,7 @@ fn emitters(geometry: &Geometry, surfaces: &[Surface], surface_of: &[u32]) -> Ve
         let [a, b, c] = geometry.triangle(primitive as u32);
         let across = (b - a).cross(c - a);
         Emitter {
+            primitive: primitive as u32,
             corners: [a, b, c],
             normal: across.normalize_or_zero(),
             area: 0.5 * across.length(),

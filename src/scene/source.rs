@@ -137,6 +137,8 @@ impl Falloff {
 /// An emissive triangle: a Lambert area light.
 #[derive(Clone, Debug)]
 pub struct Emitter {
+    /// The triangle.
+    pub primitive: u32,
     /// Corners \[m\].
     pub corners: [DVec3; 3],
     /// Unit normal of the front.
@@ -178,7 +180,7 @@ pub struct Emission {
 pub struct Sources {
     /// Lights without extent.
     pub lights: Vec<Light>,
-    /// Emissive triangles.
+    /// Emissive triangles, in the order of their primitives.
     pub emitters: Vec<Emitter>,
     /// Running sum of luminous flux over the lights \[lm\].
     light_flux: Vec<f64>,
@@ -219,6 +221,13 @@ impl Sources {
         let all = last(&self.emitter_flux);
         let emitter = &self.emitters[choose(&self.emitter_flux, u * all)];
         (emitter, emitter.flux().luminance() / all)
+    }
+
+    /// The emitter that is the triangle `primitive`, with its probability in [`Sources::choose_emitter`].
+    pub fn emitter(&self, primitive: u32) -> Option<(&Emitter, f64)> {
+        let index = self.emitters.binary_search_by_key(&primitive, |e| e.primitive).ok()?;
+        let emitter = &self.emitters[index];
+        Some((emitter, emitter.flux().luminance() / last(&self.emitter_flux)))
     }
 
     /// Starts a history. With a single source no number is drawn for the choice.

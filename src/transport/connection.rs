@@ -1,10 +1,16 @@
-//! The kernel: every vertex of every history connected to a tile of receivers.
+//! The kernel: vertices of histories connected to tiles of receivers.
 //!
-//! One estimator for illuminance and luminance; see the equations in [`super`]. Loop order is tile -> history ->
-//! vertex: the tile stays in the first cache, a history's vertices are summed in f32 (one channel or three), and
-//! its total goes once, in f64, into the score. Sums run in the order of the histories, so scores do not depend on
-//! how histories are split or by whom tiles are computed. Plain f32 operations without contraction give the same
-//! bits whatever the width of the vectors they are compiled to.
+//! One estimator for illuminance and luminance; see the equations in [`super`]. A connection of a vertex x to a
+//! receiver r carries the share min(1, b/(G s_x s_r)) of the light on its way, with G the geometric factor, s >= 1
+//! the peaks of the two laws of reflection in these directions (1 for matt ones) and b the bound of the kernel: so no
+//! history scores more than W b/pi^2 there. What is left reaches the receiver through [`super::continuation`], whose points
+//! are receivers of the same owner. b is infinite for the plain local estimate, and for light that a delta
+//! scatterer sent to the vertex: no continuation could find it.
+//!
+//! Loop order is tile -> history -> vertex: a tile stays in the first cache, a history's vertices are summed in f32
+//! (one channel or three), and its total goes once, in f64, to the owner. Sums run in the order of the histories, so
+//! scores do not depend on how histories are split or by whom tiles are computed. Plain f32 operations without
+//! contraction give the same bits whatever the width of the vectors they are compiled to.
 
 use super::receiver::Receiver;
 use super::trajectory::Vertex;
@@ -24,6 +30,10 @@ struct Connector {
     normal: Vec3,
     /// W_n rho / pi of a Lambert vertex \[lm/sr\].
     intensity: [f32; 3],
+    /// n, the reflections that light scattered here has seen.
+    order: u32,
+    /// True where the bound does not apply.
+    after_delta: bool,
     /// The vertex itself where the law of reflection depends on direction.
     glossy: Option<Vertex>,
 }
@@ -37,10 +47,9 @@ pub struct Connectors {
 }
 
 impl Connectors {
-    /// Appends the vertices of the next history; those whose order lies outside `orders` are left out.
-    pub fn push(&mut self, scene: &Scene, history: &[Vertex], orders: &Range<u32>) {
-        let counted = history.iter().filter(|v| orders.contains(&v.order));
-        self.all.extend(counted.map(|v| connector(scene, v)));
+    /// Appends the vertices of the next history.
+    pub fn push(&mut self, scene: &Scene, history: &[Vertex]) {
+        self.all.extend(history.iter().map(|v| connector(scene, v)));
         self.ends.push(self.all.len());
     }
 
@@ -54,9 +63,9 @@ impl Connectors {
         self.all.len()
     }
 
-    fn iter(&self) -> impl Iterator<Item = &[Connector]> {
-        let mut start = 0;
-        self.ends.iter().map(move |&end| &self.all[std::mem::replace(&mut start, end)..end])
+    fn iter(&self, histories: Range<usize>) -> impl Iterator<Item = &[Connector]> {
+        let mut start = histories.start.checked_sub(1).map_or(0, |before| self.ends[before]);
+        self.ends[histories].iter().map(move |&end| &self.all[std::mem::replace(&mut start, end)..end])
     }
 }
 
@@ -67,63 +76,104 @@ fn connector(scene: &Scene, v: &Vertex) -> Connector {
         lifted: scene.geometry.lift(v.position, v.normal).as_vec3(),
         normal: v.normal.as_vec3(),
         intensity: (v.weight * lambert.unwrap_or(Colour::BLACK) / PI).0.map(|c| c as f32),
+        order: v.order,
+        after_delta: v.after_delta,
         glossy: lambert.is_none().then_some(*v),
     }
 }
 
-/// What the histories of a batch give one receiver: sums over histories, not yet divided by their number.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// A point to which histories are connected on behalf of an owner: the receiver itself, or a point of its continuation.
+#[derive(Clone, Copy, Debug)]
+pub struct Link {
+    /// Number of the owner.
+    pub owner: usize,
+    /// Where the histories are connected to.
+    pub receiver: Receiver,
+}
+
+/// What histories give one owner: sums over histories, not yet divided by their number.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Connected {
     /// Sum of the totals of all histories.
     pub sum: Colour,
     /// The largest luminous total of a single history.
     pub peak: f64,
+    /// The luminous total of every history, where it is wanted.
+    pub totals: Option<Vec<f64>>,
 }
 
-/// Connects all histories to at most [`TILE`] receivers; entry i belongs to `receivers[i]`.
+/// How histories are connected.
+#[derive(Clone, Debug)]
+pub struct Rule {
+    /// b of the bounded kernel \[1/m2\]; infinite for the plain estimate.
+    pub bound: f64,
+    /// 1: the first channel stands for all three.
+    pub channels: usize,
+    /// Reflections before the receiver that count: for tests order by order.
+    pub orders: Range<u32>,
+}
+
+/// Connects the `histories` of `connectors` to all links in `tiles`; entry i of `connected` belongs to owner i.
 ///
-/// With `channels` = 1 the first channel stands for all three.
-pub fn connect(scene: &Scene, histories: &Connectors, receivers: &[Receiver], channels: usize) -> Vec<Connected> {
-    match channels {
-        1 => connect_channels::<1>(scene, histories, receivers),
-        _ => connect_channels::<3>(scene, histories, receivers),
+/// # Panics
+/// With more than [`TILE`] owners.
+pub fn connect(
+    scene: &Scene,
+    connectors: &Connectors,
+    histories: Range<usize>,
+    tiles: &[&Tile],
+    rule: &Rule,
+    connected: &mut [Connected],
+) {
+    assert!(connected.len() <= TILE, "at most {TILE} owners");
+    match rule.channels {
+        1 => connect_channels::<1>(scene, connectors.iter(histories), tiles, rule, connected),
+        _ => connect_channels::<3>(scene, connectors.iter(histories), tiles, rule, connected),
     }
 }
 
-fn connect_channels<const C: usize>(scene: &Scene, histories: &Connectors, receivers: &[Receiver]) -> Vec<Connected> {
-    let tile = Tile::new(scene, receivers);
-    let mut connected = vec![Connected::default(); receivers.len()];
-    let mut factors = [0f32; TILE];
-    let mut totals = [[0f32; TILE]; C];
-    for history in histories.iter().filter(|h| !h.is_empty()) {
-        totals.iter_mut().for_each(|t| t[..receivers.len()].fill(0.0));
-        for vertex in history {
-            let factors = &mut factors[..receivers.len()];
-            tile.factors(vertex, factors);
-            scene.geometry.shadow(vertex.lifted, &tile.lifted, factors);
-            if vertex.glossy.is_none() && tile.all_constant {
-                add_constant(&mut totals, &vertex.intensity, factors);
-            } else {
-                tile.add_varying(scene, &mut totals, vertex, factors);
+fn connect_channels<'a, const C: usize>(
+    scene: &Scene,
+    histories: impl Iterator<Item = &'a [Connector]>,
+    tiles: &[&Tile],
+    rule: &Rule,
+    connected: &mut [Connected],
+) {
+    let mut sums = [[0f32; TILE]; C];
+    let mut totals = [Colour::BLACK; TILE];
+    for history in histories {
+        let totals = &mut totals[..connected.len()];
+        totals.fill(Colour::BLACK);
+        for tile in tiles {
+            sums.iter_mut().for_each(|s| s[..tile.links.len()].fill(0.0));
+            for vertex in history.iter().filter(|v| rule.orders.contains(&(v.order + tile.depth))) {
+                tile.add(scene, vertex, rule.bound as f32, &mut sums);
             }
+            tile.add_totals(&sums, totals);
         }
-        tile.add_totals(&totals, &mut connected);
-    }
-    connected
-}
-
-/// Adds `intensity` x factor to every receiver.
-fn add_constant<const C: usize>(totals: &mut [[f32; TILE]; C], intensity: &[f32; 3], factors: &[f32]) {
-    for (total, &intensity) in totals.iter_mut().zip(intensity) {
-        for (sum, &factor) in total.iter_mut().zip(factors) {
-            *sum += intensity * factor;
+        for (total, into) in totals.iter().zip(&mut *connected) {
+            into.add(*total);
         }
     }
 }
 
-/// Receivers as a structure of arrays.
-struct Tile<'a> {
-    receivers: &'a [Receiver],
+impl Connected {
+    /// Takes in the total of one history.
+    fn add(&mut self, total: Colour) {
+        self.sum += total;
+        self.peak = self.peak.max(total.luminance());
+        if let Some(totals) = &mut self.totals {
+            totals.push(total.luminance());
+        }
+    }
+}
+
+/// At most [`TILE`] links as a structure of arrays.
+#[derive(Debug)]
+pub struct Tile {
+    links: Vec<Link>,
+    /// Reflections between these receivers and their owners.
+    depth: u32,
     x: [f32; TILE],
     y: [f32; TILE],
     z: [f32; TILE],
@@ -136,26 +186,43 @@ struct Tile<'a> {
     all_constant: bool,
 }
 
-impl<'a> Tile<'a> {
-    fn new(scene: &Scene, receivers: &'a [Receiver]) -> Self {
-        assert!(receivers.len() <= TILE, "a tile holds {TILE} receivers");
-        let constant: Vec<_> = receivers.iter().map(|r| r.response.constant(scene)).collect();
+impl Tile {
+    /// The tile of `links`, at most [`TILE`], which lie `depth` reflections before their owners.
+    pub fn new(scene: &Scene, links: Vec<Link>, depth: u32) -> Self {
+        assert!(links.len() <= TILE, "a tile holds {TILE} receivers");
+        let constant: Vec<_> = links.iter().map(|l| l.receiver.response.constant(scene)).collect();
         let column = |f: &dyn Fn(&Receiver) -> f64| {
             let mut column = [0f32; TILE];
-            column.iter_mut().zip(receivers).for_each(|(c, r)| *c = f(r) as f32);
+            column.iter_mut().zip(&links).for_each(|(c, l)| *c = f(&l.receiver) as f32);
             column
         };
+        let lift = |l: &Link| scene.geometry.lift(l.receiver.position, l.receiver.normal).as_vec3();
         Tile {
-            receivers,
+            depth,
             x: column(&|r| r.position.x),
             y: column(&|r| r.position.y),
             z: column(&|r| r.position.z),
             normal_x: column(&|r| r.normal.x),
             normal_y: column(&|r| r.normal.y),
             normal_z: column(&|r| r.normal.z),
-            lifted: receivers.iter().map(|r| scene.geometry.lift(r.position, r.normal).as_vec3()).collect(),
+            lifted: links.iter().map(lift).collect(),
             all_constant: constant.iter().all(Option::is_some),
             constant,
+            links,
+        }
+    }
+
+    /// Adds what `vertex` gives each receiver, a constant response left out.
+    fn add<const C: usize>(&self, scene: &Scene, vertex: &Connector, bound: f32, sums: &mut [[f32; TILE]; C]) {
+        let mut factors = [0f32; TILE];
+        let factors = &mut factors[..self.links.len()];
+        let bound = if vertex.after_delta { f32::INFINITY } else { bound };
+        self.factors(vertex, factors);
+        scene.geometry.shadow(vertex.lifted, &self.lifted, factors);
+        if vertex.glossy.is_none() && self.all_constant {
+            add_constant(sums, &vertex.intensity, bound, factors);
+        } else {
+            self.add_varying(scene, sums, vertex, bound, factors);
         }
     }
 
@@ -176,35 +243,47 @@ impl<'a> Tile<'a> {
     fn add_varying<const C: usize>(
         &self,
         scene: &Scene,
-        totals: &mut [[f32; TILE]; C],
+        sums: &mut [[f32; TILE]; C],
         vertex: &Connector,
+        bound: f32,
         factors: &[f32],
     ) {
         for (i, &factor) in factors.iter().enumerate().filter(|(_, f)| **f != 0.0) {
-            let receiver = &self.receivers[i];
+            let receiver = &self.links[i].receiver;
             let w = (receiver.position - vertex.position.as_dvec3()).normalize();
-            let mut value = vertex.intensity;
+            let (mut value, mut peak) = (vertex.intensity, 1.0);
             if let Some(v) = &vertex.glossy {
-                let sigma = scene.surface(v.primitive).reflectance.evaluate(v.normal, v.w_in, w);
-                value = (v.weight * sigma).0.map(|c| c as f32);
+                let reflectance = &scene.surface(v.primitive).reflectance;
+                let f = reflectance.evaluate(v.normal, v.w_in, w);
+                value = (v.weight * f).0.map(|c| c as f32);
+                peak = reflectance.peak(f);
             }
             if self.constant[i].is_none() {
-                let response = receiver.response.to(scene, receiver.normal, w);
+                let (response, of_receiver) = receiver.response.with_peak(scene, receiver.normal, w);
                 value = std::array::from_fn(|c| value[c] * response.0[c] as f32);
+                peak *= of_receiver;
             }
-            for (total, &v) in totals.iter_mut().zip(&value) {
-                total[i] += v * factor;
+            let carried = factor.min(bound / peak as f32);
+            for (sum, &v) in sums.iter_mut().zip(&value) {
+                sum[i] += v * carried;
             }
         }
     }
 
-    /// Adds the totals of one history to the scores.
-    fn add_totals<const C: usize>(&self, totals: &[[f32; TILE]; C], connected: &mut [Connected]) {
-        for (i, into) in connected.iter_mut().enumerate() {
-            let total = Colour(std::array::from_fn(|c| f64::from(totals[c.min(C - 1)][i])));
-            let total = total * self.constant[i].unwrap_or(Colour::WHITE);
-            into.sum += total;
-            into.peak = into.peak.max(total.luminance());
+    /// Adds the sums of one history to the totals of the owners.
+    fn add_totals<const C: usize>(&self, sums: &[[f32; TILE]; C], totals: &mut [Colour]) {
+        for (i, link) in self.links.iter().enumerate() {
+            let sum = Colour(std::array::from_fn(|c| f64::from(sums[c.min(C - 1)][i])));
+            totals[link.owner] += sum * self.constant[i].unwrap_or(Colour::WHITE);
+        }
+    }
+}
+
+/// Adds `intensity` x bounded factor to every receiver.
+fn add_constant<const C: usize>(sums: &mut [[f32; TILE]; C], intensity: &[f32; 3], bound: f32, factors: &[f32]) {
+    for (sums, &intensity) in sums.iter_mut().zip(intensity) {
+        for (sum, &factor) in sums.iter_mut().zip(factors) {
+            *sum += intensity * factor.min(bound);
         }
     }
 }

@@ -1,10 +1,13 @@
 //! Direct light at a receiver, never from particle hits: E_0, and with a reflectance as response K L0.
 //!
 //! Lights without extent are exact. Area lights are sampled: an emitter chosen in proportion to flux (the choice
-//! stratified over the samples), then a direction uniform in its solid angle, which stays bounded at contact.
+//! stratified over the samples), then a direction uniform in its solid angle, which stays bounded at contact. Where
+//! the response is peaked, directions drawn from it look for the emitters as well, and the two are weighed by the
+//! balance heuristic (Veach and Guibas 1995): each where its density is the higher.
 
 use super::receiver::Receiver;
 use super::spherical_triangle::SphericalTriangle;
+use crate::geometry::{Hit, Ray};
 use crate::math::DVec3;
 use crate::photometry::Colour;
 use crate::random::Generator;
@@ -32,7 +35,7 @@ pub fn from_lights(scene: &Scene, receiver: &Receiver) -> Colour {
         }
         let visible = match from {
             Some(position) => scene.geometry.visible(lifted.as_vec3(), position.as_vec3()),
-            None => scene.geometry.closest_hit(&crate::geometry::Ray { origin: lifted, direction: -w_in }).is_none(),
+            None => scene.geometry.closest_hit(&Ray { origin: lifted, direction: -w_in }).is_none(),
         };
         if visible {
             sum += across * cosine * receiver.response.to(scene, receiver.normal, w_in);
@@ -52,43 +55,95 @@ pub fn from_emitters(scene: &Scene, receiver: &Receiver, samples: u64, rng: &mut
     for k in 0..samples {
         let stratum = (k as f64 + rng.uniform()) / samples as f64;
         let (emitter, probability) = scene.sources.choose_emitter(stratum);
-        sum += sample_emitter(scene, receiver, lifted, emitter, rng) / probability;
+        if let Some(sight) = Sight::new(emitter, probability, lifted) {
+            sum += sample_emitter(scene, receiver, &sight, rng);
+        }
+        if receiver.response.is_peaked(scene) {
+            sum += sample_response(scene, receiver, lifted, rng);
+        }
     }
     sum / samples as f64
 }
 
-/// One sample of the light from `emitter`.
-fn sample_emitter(scene: &Scene, receiver: &Receiver, from: DVec3, emitter: &Emitter, rng: &mut Generator) -> Colour {
-    let side = emitter.normal.dot(from - emitter.corners[0]);
-    if side == 0.0 || (side < 0.0 && !emitter.double_sided) {
-        return Colour::BLACK;
-    }
-    let normal = emitter.normal * side.signum();
-    let Some((point, solid_angle)) = sample_point(from, emitter, normal, rng) else {
-        return Colour::BLACK;
-    };
-    let w_in = (from - point).normalize();
+/// One sample of the light from the emitter in sight.
+fn sample_emitter(scene: &Scene, receiver: &Receiver, sight: &Sight, rng: &mut Generator) -> Colour {
+    let Some(point) = sight.sample(rng) else { return Colour::BLACK };
+    let w_in = (sight.from - point).normalize();
     let cosine = -receiver.normal.dot(w_in);
-    let target = scene.geometry.lift(point, normal).as_vec3();
-    if cosine <= 0.0 || !scene.geometry.visible(from.as_vec3(), target) {
+    let target = scene.geometry.lift(point, sight.normal).as_vec3();
+    if cosine <= 0.0 || !scene.geometry.visible(sight.from.as_vec3(), target) {
         return Colour::BLACK;
     }
-    emitter.luminance * (cosine * solid_angle) * receiver.response.to(scene, receiver.normal, w_in)
+    let both = sight.density(point) + density_of_response(scene, receiver, w_in);
+    sight.emitter.luminance * (cosine / both) * receiver.response.to(scene, receiver.normal, w_in)
 }
 
-/// A point of `emitter` and one over its density in solid angle seen from `from` \[sr\].
-fn sample_point(from: DVec3, emitter: &Emitter, normal: DVec3, rng: &mut Generator) -> Option<(DVec3, f64)> {
-    let [a, b, c] = emitter.corners;
-    let edge2 = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
-    let random = rng.uniform2();
-    if ((a + b + c) / 3.0 - from).length_squared() > FAR * FAR * edge2 {
-        let point = emitter.point(random);
-        let way = from - point;
-        let d2 = way.length_squared();
-        return Some((point, emitter.area * normal.dot(way) / (d2 * d2.sqrt())));
+/// One sample of the light that emitters send where the peaked response looks.
+fn sample_response(scene: &Scene, receiver: &Receiver, from: DVec3, rng: &mut Generator) -> Colour {
+    let Some((direction, weight)) = receiver.response.sample(scene, receiver.normal, rng) else {
+        return Colour::BLACK;
+    };
+    let hit = scene.geometry.closest_hit(&Ray { origin: from, direction });
+    let emitter = |hit: Hit| {
+        let (emitter, probability) = scene.sources.emitter(hit.primitive)?;
+        Some((hit, Sight::new(emitter, probability, from)?))
+    };
+    let Some((hit, sight)) = hit.and_then(emitter) else { return Colour::BLACK };
+    let density = density_of_response(scene, receiver, -direction);
+    sight.emitter.luminance * weight * (density / (density + sight.density(hit.position)))
+}
+
+/// Density of directions drawn from the response, 0 where it is not peaked and none are drawn \[1/sr\].
+fn density_of_response(scene: &Scene, receiver: &Receiver, w_in: DVec3) -> f64 {
+    let peaked = receiver.response.is_peaked(scene);
+    if peaked { receiver.response.pdf(scene, receiver.normal, w_in) } else { 0.0 }
+}
+
+/// An emitter seen from a point on its lit side.
+struct Sight<'a> {
+    emitter: &'a Emitter,
+    /// Probability of its choice.
+    probability: f64,
+    from: DVec3,
+    /// Unit normal on the side of the point.
+    normal: DVec3,
+    /// None from afar, where the emitter is sampled by area.
+    triangle: Option<SphericalTriangle>,
+}
+
+impl<'a> Sight<'a> {
+    /// `emitter` seen from the point `from`; `None` where its side there is dark.
+    fn new(emitter: &'a Emitter, probability: f64, from: DVec3) -> Option<Self> {
+        let [a, b, c] = emitter.corners;
+        let side = emitter.normal.dot(from - a);
+        if side == 0.0 || (side < 0.0 && !emitter.double_sided) {
+            return None;
+        }
+        let edge2 = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
+        let far = ((a + b + c) / 3.0 - from).length_squared() > FAR * FAR * edge2;
+        let triangle = (!far).then(|| SphericalTriangle::new(&emitter.corners, from));
+        Some(Sight { emitter, probability, from, normal: emitter.normal * side.signum(), triangle })
     }
-    let triangle = SphericalTriangle::new(&emitter.corners, from);
-    let direction = triangle.sample(random);
-    let distance = normal.dot(a - from) / normal.dot(direction);
-    (distance > 0.0 && distance.is_finite()).then(|| (from + distance * direction, triangle.solid_angle))
+
+    /// A point of the emitter.
+    fn sample(&self, rng: &mut Generator) -> Option<DVec3> {
+        let random = rng.uniform2();
+        let Some(triangle) = &self.triangle else { return Some(self.emitter.point(random)) };
+        let direction = triangle.sample(random);
+        let distance = self.normal.dot(self.emitter.corners[0] - self.from) / self.normal.dot(direction);
+        (distance > 0.0 && distance.is_finite()).then(|| self.from + distance * direction)
+    }
+
+    /// Density in solid angle with which `point` is drawn, the choice of the emitter included \[1/sr\].
+    fn density(&self, point: DVec3) -> f64 {
+        let solid_angle = match &self.triangle {
+            Some(triangle) => triangle.solid_angle,
+            None => {
+                let way = self.from - point;
+                let d2 = way.length_squared();
+                self.emitter.area * self.normal.dot(way) / (d2 * d2.sqrt())
+            }
+        };
+        self.probability / solid_angle
+    }
 }

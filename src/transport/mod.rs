@@ -39,6 +39,7 @@
 //! Transport does not know files, threads, shards, how many histories run, nor the shape of a picture.
 
 pub mod connection;
+pub mod continuation;
 pub mod direct;
 pub mod eye;
 pub mod receiver;

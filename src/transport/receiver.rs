@@ -5,9 +5,9 @@
 //! points differ in nothing else.
 
 use crate::geometry::{Hit, Ray};
-use crate::math::{DVec3, PI};
+use crate::math::{DVec3, PI, to_world};
 use crate::photometry::Colour;
-use crate::random::Generator;
+use crate::random::{Generator, cosine_hemisphere};
 use crate::scene::{Reflectance, Scene};
 
 /// Mirrors that an eye ray follows before it is given up; facing perfect mirrors would be followed for ever.
@@ -37,6 +37,9 @@ pub enum Response {
         to_eye: DVec3,
         /// What the mirrors on the way to the eye reflect, over the probability of having followed them.
         attenuation: Colour,
+        /// Of a point that continues another receiver: b/(G s) of the step between them. Connections to the other carry
+        /// the share min(1, carried/s) of light with the peak s here, see [`super::continuation`]. Else 0.
+        carried: f64,
     },
 }
 
@@ -45,22 +48,71 @@ impl Response {
     pub fn constant(&self, scene: &Scene) -> Option<Colour> {
         match self {
             Response::Cosine => Some(Colour::WHITE),
-            Response::Reflectance { primitive, attenuation, .. } => {
+            Response::Reflectance { primitive, attenuation, carried, .. } => {
                 let rho = scene.surface(*primitive).reflectance.lambert()?;
-                Some(rho * *attenuation / PI)
+                Some(rho * *attenuation * (left(*carried, 1.0) / PI))
             }
         }
     }
 
     /// The response to light with propagation direction `w_in` at a receiver with `normal`.
     pub fn to(&self, scene: &Scene, normal: DVec3, w_in: DVec3) -> Colour {
+        self.with_peak(scene, normal, w_in).0
+    }
+
+    /// The same, and how peaked it is there: 1 for lux-meters and for every law that is not peaked.
+    pub fn with_peak(&self, scene: &Scene, normal: DVec3, w_in: DVec3) -> (Colour, f64) {
         match self {
-            Response::Cosine => Colour::WHITE,
-            Response::Reflectance { primitive, to_eye, attenuation } => {
-                scene.surface(*primitive).reflectance.evaluate(normal, w_in, *to_eye) * *attenuation
+            Response::Cosine => (Colour::WHITE, 1.0),
+            Response::Reflectance { primitive, to_eye, attenuation, carried } => {
+                let reflectance = &scene.surface(*primitive).reflectance;
+                let f = reflectance.evaluate(normal, w_in, *to_eye);
+                let peak = reflectance.peak(f);
+                (f * *attenuation * left(*carried, peak), peak)
             }
         }
     }
+
+    /// True when connections to a receiver with this response are spiky.
+    pub fn is_peaked(&self, scene: &Scene) -> bool {
+        match self {
+            Response::Cosine => false,
+            Response::Reflectance { primitive, .. } => scene.surface(*primitive).reflectance.is_peaked(),
+        }
+    }
+
+    /// Draws a direction out of a receiver with `normal`: the direction v, and response x cosine / density of light that
+    /// arrives against it. `None` where nothing or a delta component was drawn.
+    pub fn sample(&self, scene: &Scene, normal: DVec3, rng: &mut Generator) -> Option<(DVec3, Colour)> {
+        match self {
+            Response::Cosine => Some((to_world(normal, cosine_hemisphere(rng.uniform2())), Colour::grey(PI))),
+            Response::Reflectance { primitive, to_eye, attenuation, carried } => {
+                let reflectance = &scene.surface(*primitive).reflectance;
+                // Laws are reciprocal: light sent back from the eye leaves in the directions that the eye receives.
+                let scattered = reflectance.sample(normal, -*to_eye, rng).filter(|s| !s.delta)?;
+                let peak = match reflectance.is_peaked() {
+                    true => reflectance.peak(reflectance.evaluate(normal, -scattered.direction, *to_eye)),
+                    false => 1.0,
+                };
+                Some((scattered.direction, scattered.factor * *attenuation * left(*carried, peak)))
+            }
+        }
+    }
+
+    /// Density with which [`Response::sample`] draws the direction against `w_in` \[1/sr\].
+    pub fn pdf(&self, scene: &Scene, normal: DVec3, w_in: DVec3) -> f64 {
+        match self {
+            Response::Cosine => (-w_in.dot(normal)).max(0.0) / PI,
+            Response::Reflectance { primitive, to_eye, .. } => {
+                scene.surface(*primitive).reflectance.pdf(normal, -*to_eye, -w_in)
+            }
+        }
+    }
+}
+
+/// What connections that carry the share `carried`/`peak` leave to a continuation.
+fn left(carried: f64, peak: f64) -> f64 {
+    1.0 - (carried / peak).min(1.0)
 }
 
 /// What an eye ray meets.
@@ -114,7 +166,8 @@ pub fn look_at(scene: &Scene, mut hit: Hit, mut direction: DVec3, rng: &mut Gene
 
 /// The receiver at `hit`, if the surface there reflects.
 fn receiver(scene: &Scene, hit: &Hit, direction: DVec3, attenuation: Colour) -> Option<Receiver> {
-    let response = Response::Reflectance { primitive: hit.primitive, to_eye: -direction, attenuation };
+    let (primitive, to_eye) = (hit.primitive, -direction);
+    let response = Response::Reflectance { primitive, to_eye, attenuation, carried: 0.0 };
     let reflects = !scene.surface(hit.primitive).reflectance.is_black();
     reflects.then_some(Receiver { position: hit.position, normal: hit.normal, response })
 }

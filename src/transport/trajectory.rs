@@ -30,6 +30,8 @@ pub struct Vertex {
     pub primitive: u32,
     /// n: reflections that light scattered here has seen, this one included.
     pub order: u32,
+    /// True when the light came from a delta scatterer: no receiver-side path can find it.
+    pub after_delta: bool,
 }
 
 /// Luminous flux of one or more histories by its fate \[lm\].
@@ -71,6 +73,7 @@ pub fn trace(scene: &Scene, transport: &Transport, rng: &mut Generator, vertices
     let mut flux = FluxBalance { emitted: first, ..FluxBalance::default() };
     let mut ray = Ray { origin: start.origin, direction: start.direction };
     let mut weight = start.weight;
+    let mut after_delta = false;
     for order in 1..=MAX_VERTICES {
         let Some(hit) = scene.geometry.closest_hit(&ray) else {
             flux.escaped += weight.luminance();
@@ -83,7 +86,7 @@ pub fn trace(scene: &Scene, transport: &Transport, rng: &mut Generator, vertices
         let reflectance = &scene.surface(hit.primitive).reflectance;
         if !reflectance.is_black() {
             let (position, normal, w_in) = (hit.position, hit.normal, ray.direction);
-            vertices.push(Vertex { position, normal, w_in, weight, primitive: hit.primitive, order });
+            vertices.push(Vertex { position, normal, w_in, weight, primitive: hit.primitive, order, after_delta });
         }
         if reflectance.has_delta() {
             flux.met_delta += weight.luminance();
@@ -98,6 +101,7 @@ pub fn trace(scene: &Scene, transport: &Transport, rng: &mut Generator, vertices
             return flux;
         };
         weight = survivor;
+        after_delta = scattered.delta;
         ray = Ray { origin: scene.geometry.lift(hit.position, hit.normal), direction: scattered.direction };
     }
     flux.lost += weight.luminance();

@@ -2,7 +2,11 @@
 //!
 //! The bin of a map has one position in each of its strata and batch, for direct light; one of them, its stratum
 //! drawn anew each batch, carries the connections. A lux-meter stays where it is, and its direct light from lights
-//! without extent is computed once.
+//! without extent is computed once. How histories are turned into scores is in `local`.
+
+mod local;
+
+pub use local::TileScores;
 
 use crate::error::{Error, Result};
 use crate::job::{Camera, Job, SetShape};
@@ -10,8 +14,6 @@ use crate::math::{DVec2, DVec3};
 use crate::photometry::Colour;
 use crate::random::{Domain, Generator, Stream};
 use crate::scene::Scene;
-use crate::tally::Scores;
-use crate::transport::connection::{Connected, Connectors, connect};
 use crate::transport::direct::{emitter_samples, from_emitters, from_lights};
 use crate::transport::eye::{Eye, Gaze, latitude};
 use crate::transport::receiver::{Receiver, Response, Seen, look, look_at};
@@ -21,6 +23,8 @@ pub struct ReceiverSet {
     shape: SetShape,
     bins: Bins,
     stream: Stream,
+    /// Of the receiver-side continuations.
+    continuations: Stream,
     histories: u64,
     /// b of the bounded kernel \[1/m2\]; infinite where nothing is bounded.
     bound: f64,
@@ -57,16 +61,6 @@ struct Sensed {
     existed: bool,
 }
 
-/// Scores of the bins of one tile.
-pub struct TileScores(Vec<BinScore>);
-
-struct BinScore {
-    value: Colour,
-    direct: Colour,
-    peak: f64,
-    existed: bool,
-}
-
 impl ReceiverSet {
     /// All receiver sets of `job` in the order of [`Job::sets`], regions left out; the job has passed
     /// [`ReceiverSet::check`]. `bounds` holds b of each set \[1/m2\], or is empty where nothing is bounded.
@@ -95,8 +89,9 @@ impl ReceiverSet {
 
     fn new(job: &Job, shape: SetShape, bins: Bins, bound: f64) -> Self {
         let stream = Stream::new(job.run.seed, Domain::Receiver, &shape.name);
+        let continuations = Stream::new(job.run.seed, Domain::Continuation, &shape.name);
         let histories = job.run.histories_per_batch;
-        let mut set = ReceiverSet { shape, bins, stream, histories, bound, sights: Vec::new() };
+        let mut set = ReceiverSet { shape, bins, stream, continuations, histories, bound, sights: Vec::new() };
         if let Bins::Film { eye: eye @ Eye::Surface { .. }, .. } = &set.bins {
             set.sights = (0..set.shape.bins()).map(|i| set.probe(eye, i)).collect();
         }
@@ -213,27 +208,9 @@ impl ReceiverSet {
         film
     }
 
-    /// Scores the bins of one tile against all histories of a batch.
-    pub fn score_tile(
-        &self,
-        scene: &Scene,
-        bins: &[u32],
-        batch: u64,
-        histories: &Connectors,
-        channels: usize,
-    ) -> TileScores {
-        let sensed: Vec<Sensed> = bins.iter().map(|&bin| self.sense(scene, bin as usize, batch)).collect();
-        let receivers: Vec<Receiver> = sensed.iter().filter_map(|s| s.receiver).collect();
-        let mut connected = connect(scene, histories, &receivers, channels).into_iter();
-        let score = |s: &Sensed| {
-            let Connected { sum, peak } = match s.receiver {
-                Some(_) => connected.next().expect("one result for each receiver"),
-                None => Connected::default(),
-            };
-            let value = s.direct + sum / self.histories as f64;
-            BinScore { value, direct: s.direct, peak, existed: s.existed }
-        };
-        TileScores(sensed.iter().map(score).collect())
+    /// Where bin `bin` looks in its first batch, if anything reflects there.
+    pub fn receiver(&self, scene: &Scene, bin: usize) -> Option<Receiver> {
+        self.sense(scene, bin, 0).receiver
     }
 
     /// Direct light and receiver of one bin in one batch.
@@ -295,20 +272,4 @@ fn meter(scene: &Scene, position: [f64; 3], normal: [f64; 3]) -> Option<Receiver
     let lifted = scene.geometry.lift(position, normal);
     let inside = scene.geometry.is_inside(lifted, |hit| scene.absorbs(hit));
     (!inside).then_some(Receiver { position, normal, response: Response::Cosine })
-}
-
-impl TileScores {
-    /// Writes the scores of `bins` to their places.
-    pub fn scatter(self, bins: &[u32], scores: &mut Scores) {
-        for (&bin, score) in bins.iter().zip(self.0) {
-            let bin = bin as usize;
-            scores.value[bin] = score.value.luminance();
-            scores.direct[bin] = score.direct.luminance();
-            scores.peak[bin] = score.peak;
-            scores.existed[bin] = score.existed;
-            if let Some(colour) = scores.colour.get_mut(bin) {
-                *colour = score.value.0;
-            }
-        }
-    }
 }

@@ -190,6 +190,14 @@ impl Glossy {
         matches!(self.specular, Specular::Mirror)
     }
 
+    /// pi f = F0 / (4 alpha^2) above the tolerated at normal incidence.
+    pub(super) fn is_peaked(&self) -> bool {
+        match &self.specular {
+            Specular::Mirror => false,
+            Specular::Rough(facets, _) => self.f0.luminance() > 4.0 * super::PEAK * facets.alpha() * facets.alpha(),
+        }
+    }
+
     /// True when f without the delta component is zero.
     pub(super) fn is_black(&self) -> bool {
         self.has_delta() && self.diffuse.is_black()

@@ -61,6 +61,11 @@ impl Microfacets {
         Microfacets { alpha, alpha2: alpha * alpha }
     }
 
+    /// The roughness it was made of.
+    pub fn alpha(&self) -> f64 {
+        self.alpha
+    }
+
     /// D / (2 `divisor`), in one division: this is where a connection spends its time.
     fn normals_over(&self, pair: &Pair, divisor: f64) -> f64 {
         let d = self.alpha2 * pair.along2 + pair.across2;

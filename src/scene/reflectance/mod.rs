@@ -16,6 +16,9 @@ use crate::photometry::Colour;
 use crate::random::{Generator, cosine_hemisphere};
 use glossy::Glossy;
 
+/// pi f from which on a law counts as peaked: a connection may then weigh this many times one to a white matt surface.
+const PEAK: f64 = 4.0;
+
 /// How a surface reflects.
 #[derive(Clone, Debug)]
 pub enum Reflectance {
@@ -126,6 +129,21 @@ impl Reflectance {
             Reflectance::Lambert(rho) => rho.is_black(),
             Reflectance::Glossy(law) => law.is_black(),
         }
+    }
+
+    /// True when the finite part has a lobe so narrow that connections alone would be spiky: its pi f exceeds 4 where a
+    /// direction at normal incidence is mirrored.
+    pub fn is_peaked(&self) -> bool {
+        match self {
+            Reflectance::Lambert(_) => false,
+            Reflectance::Glossy(law) => law.is_peaked(),
+        }
+    }
+
+    /// How many times the tolerated weight a connection with this value of `f` has: at least 1, and 1 for every law that
+    /// is not peaked.
+    pub fn peak(&self, f: Colour) -> f64 {
+        if self.is_peaked() { (PI / PEAK * f.luminance()).max(1.0) } else { 1.0 }
     }
 
     /// The same law with every colour replaced by its luminance, for one photometric channel. Exact for grey

@@ -1,0 +1,137 @@
+//! Scores by local estimation: the histories of a batch connected to the receivers of a tile and to the points of their
+//! continuations.
+//!
+//! A receiver that needs it has C paths in a batch, C proportional to the histories, each serving an equal share of
+//! them: so no part of the variance stays when the histories grow. Paths are drawn group by group of the histories, so that
+//! memory holds those of one group.
+
+use super::ReceiverSet;
+use crate::photometry::Colour;
+use crate::random::Generator;
+use crate::scene::Scene;
+use crate::tally::{Scores, Watched};
+use crate::transport::connection::{Connected, Connectors, Link, Rule, TILE, Tile, connect};
+use crate::transport::continuation::{continue_from, is_due};
+use crate::transport::receiver::Receiver;
+use std::ops::Range;
+
+/// Histories that share a continuation of each receiver: chosen by measured figure of merit (docs/benchmarks.md).
+const HISTORIES_OF_A_PATH: usize = 4;
+
+/// Scores of the bins of one tile.
+pub struct TileScores(Vec<BinScore>);
+
+struct BinScore {
+    value: Colour,
+    direct: Colour,
+    peak: f64,
+    existed: bool,
+    watched: Option<Vec<f64>>,
+}
+
+/// A receiver that is continued, with the generator of its paths in this batch.
+struct Continued {
+    owner: usize,
+    receiver: Receiver,
+    rng: Generator,
+}
+
+impl ReceiverSet {
+    /// Scores the bins of one tile against all histories of a batch.
+    pub fn score_tile(
+        &self,
+        scene: &Scene,
+        bins: &[u32],
+        batch: u64,
+        histories: &Connectors,
+        (channels, orders): (usize, &Range<u32>),
+    ) -> TileScores {
+        let sensed: Vec<_> = bins.iter().map(|&bin| self.sense(scene, bin as usize, batch)).collect();
+        let mut connected: Vec<Connected> = bins.iter().map(|bin| self.nothing(*bin)).collect();
+        let links = |(owner, receiver): (usize, Option<Receiver>)| Some(Link { owner, receiver: receiver? });
+        let links: Vec<Link> = sensed.iter().map(|s| s.receiver).enumerate().filter_map(links).collect();
+        let mut continued = self.continued(scene, &links, bins, batch);
+        let base = Tile::new(scene, links, 0);
+        let rule = Rule { bound: self.bound, channels, orders: orders.clone() };
+        let all = histories.histories();
+        let groups = if continued.is_empty() { 1 } else { (all / HISTORIES_OF_A_PATH).max(1) };
+        let mut continuing = vec![Colour::BLACK; bins.len()];
+        for group in 0..groups {
+            let range = group * all / groups..(group + 1) * all / groups;
+            let tiles = continue_all(scene, &mut continued, &rule, range.len(), &mut continuing);
+            let tiles: Vec<&Tile> = std::iter::once(&base).chain(&tiles).collect();
+            connect(scene, histories, range, &tiles, &rule, &mut connected);
+        }
+        let scores = sensed.iter().zip(connected).zip(continuing).map(|((sensed, connected), continuing)| {
+            let indirect = (connected.sum + continuing) / self.histories as f64;
+            let (direct, existed, peak) = (sensed.direct, sensed.existed, connected.peak);
+            BinScore { value: direct + indirect, direct, peak, existed, watched: connected.totals }
+        });
+        TileScores(scores.collect())
+    }
+
+    /// No connections yet, of a bin whose histories are remembered where it is monitored.
+    fn nothing(&self, bin: u32) -> Connected {
+        let monitored = self.shape.monitored.binary_search(&bin).is_ok();
+        Connected { totals: monitored.then(Vec::new), ..Connected::default() }
+    }
+
+    /// The receivers among `links` that need a continuation.
+    fn continued(&self, scene: &Scene, links: &[Link], bins: &[u32], batch: u64) -> Vec<Continued> {
+        let due = links.iter().filter(|l| is_due(scene, &l.receiver, self.bound));
+        let continued = due.map(|&Link { owner, receiver }| {
+            let index = batch * self.shape.bins() as u64 + u64::from(bins[owner]);
+            Continued { owner, receiver, rng: self.continuations.generator(index) }
+        });
+        continued.collect()
+    }
+}
+
+/// Draws the next path of each of the `continued`: its points as tiles, one or more for each depth. Direct light at them, times
+/// the `histories` that the paths serve, is added to `continuing`.
+fn continue_all(
+    scene: &Scene,
+    continued: &mut [Continued],
+    rule: &Rule,
+    histories: usize,
+    continuing: &mut [Colour],
+) -> Vec<Tile> {
+    let mut of_depth: Vec<Vec<Link>> = Vec::new();
+    for Continued { owner, receiver, rng } in continued {
+        let path = continue_from(scene, receiver, rule.bound, rng);
+        for (k, (direct, point)) in path.direct.into_iter().zip(path.points).enumerate() {
+            if of_depth.len() == k {
+                of_depth.push(Vec::new());
+            }
+            of_depth[k].push(Link { owner: *owner, receiver: point });
+            if rule.orders.contains(&(k as u32 + 1)) {
+                continuing[*owner] += direct * histories as f64;
+            }
+        }
+    }
+    let numbered = of_depth.into_iter().zip(1..);
+    numbered.flat_map(|(links, depth)| tiles_of(scene, links, depth)).collect()
+}
+
+fn tiles_of(scene: &Scene, links: Vec<Link>, depth: u32) -> Vec<Tile> {
+    links.chunks(TILE).map(|links| Tile::new(scene, links.to_vec(), depth)).collect()
+}
+
+impl TileScores {
+    /// Writes the scores of `bins`, of a set that watches those in `monitored`, to their places.
+    pub fn scatter(self, bins: &[u32], monitored: &[u32], scores: &mut Scores) {
+        for (&bin, score) in bins.iter().zip(self.0) {
+            if let (Ok(place), Some(totals)) = (monitored.binary_search(&bin), score.watched) {
+                scores.watched[place] = Watched { totals };
+            }
+            let bin = bin as usize;
+            scores.value[bin] = score.value.luminance();
+            scores.direct[bin] = score.direct.luminance();
+            scores.peak[bin] = score.peak;
+            scores.existed[bin] = score.existed;
+            if let Some(colour) = scores.colour.get_mut(bin) {
+                *colour = score.value.0;
+            }
+        }
+    }
+}
