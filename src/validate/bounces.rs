@@ -33,7 +33,7 @@ pub(super) fn cases() -> Vec<Case> {
             "configuration factor of a perpendicular rectangle times rho E",
             edge,
         ),
-        case("bounce/edge-plain", "the same 1 cm from the edge by the plain estimate", "the same", edge_plain),
+        case("bounce/edge-plain", "the same 10 cm from the edge by the plain estimate", "the same", edge_plain),
     ]
 }
 
@@ -104,11 +104,11 @@ fn strip(half: f64, distance: f64, job: &str) -> Result<Comparison> {
 }
 
 fn edge() -> Result<Vec<Comparison>> {
-    Ok(vec![strip(3.0, 1.0, &run(16384, 64))?, strip(1.0, 0.1, &run(16384, 64))?, strip(0.5, 0.01, &run(65536, 64))?])
+    Ok(vec![strip(3.0, 1.0, &run(16384, 64))?, strip(3.0, 0.1, &run(16384, 64))?, strip(3.0, 0.01, &run(16384, 64))?])
 }
 
 fn edge_plain() -> Result<Vec<Comparison>> {
-    Ok(vec![strip(0.5, 0.01, &(run(65536, 64) + PLAIN))?])
+    Ok(vec![strip(1.0, 0.1, &(run(65536, 64) + PLAIN))?])
 }
 
 #[cfg(test)]

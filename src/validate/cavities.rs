@@ -117,7 +117,7 @@ fn mean_indirect(name: &str, walls: &[[DVec3; 3]], rho: f64) -> Result<Compariso
     let mut model = Model::default();
     walls.iter().for_each(|&[origin, u, v]| add_quad(&mut model, origin, u, v, lambert(rho, 0.0)));
     let (meters, weights) = wall_meters(walls);
-    let job = run(512, 32) + &omni([0.4, 0.6, 0.5], 100.0) + &meters;
+    let job = run(128, 16) + &omni([0.4, 0.6, 0.5], 100.0) + &meters;
     let (_, batches) = Experiment::new(&job, model)?.batches(1..u32::MAX);
     let exact = rho * cavity(400.0 * PI, walls.len() as f64, rho);
     // 1e-4: what the Gauss rule loses near edges.

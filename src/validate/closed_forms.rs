@@ -40,7 +40,7 @@ pub fn perpendicular_corner(a: f64, b: f64, c: f64) -> f64 {
 }
 
 /// Illuminance at `point` with unit `normal` from a polygon of luminance `luminance`, wholly above the horizon, its
-/// `corners` clockwise as seen from the point (Lambert) \[lx\].
+/// `corners` in order, either way round (Lambert) \[lx\].
 pub fn polygon(luminance: f64, point: DVec3, normal: DVec3, corners: &[DVec3]) -> f64 {
     let next = corners.iter().cycle().skip(1);
     let edge = |(&a, &b): (&DVec3, &DVec3)| {

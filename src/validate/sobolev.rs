@@ -1,7 +1,7 @@
 //! Sobolev's problem, paper (6)-(8): an omni between two infinite Lambert planes 1 m apart. In illuminance and in
 //! luminance, as totals and order by order.
 
-use super::experiment::{Experiment, flux};
+use super::experiment::{Experiment, estimates, flux};
 use super::reference::{SOBOLEV, SOBOLEV_ORDERS, number, rows};
 use super::scenes::{PLAIN, point, run, sobolev, spot_camera};
 use super::{Case, Comparison};
@@ -13,7 +13,8 @@ const THEME: &str = "Sobolev's problem";
 
 /// Height of the lamp \[m\] and reflectances of a published case.
 pub struct Parameters {
-    name: &'static str,
+    /// A letter.
+    pub name: &'static str,
     /// Height of the lamp above plane 1 \[m\].
     pub h1: f64,
     /// Reflectance of plane 1.
@@ -32,12 +33,12 @@ pub const CASES: [Parameters; 4] = [
 
 /// The cases, in order.
 pub(super) fn cases() -> Vec<Case> {
-    let total = |name, checks, which: usize| Case {
+    let total = |name, checks, which: usize, histories| Case {
         theme: THEME,
         name,
         checks,
         reference: "paper (7) by quadrature of 15 digits, table; L = rho E / pi",
-        run: Box::new(move || totals(&CASES[which])),
+        run: Box::new(move || totals(&CASES[which], histories)),
     };
     let order = |name, checks, which: usize| Case {
         theme: THEME,
@@ -47,21 +48,21 @@ pub(super) fn cases() -> Vec<Case> {
         run: Box::new(move || orders(&CASES[which])),
     };
     vec![
-        total("sobolev/A", "h 0.5 and 0.5, rho 0.5 and 0.5: E and L of both planes", 0),
-        total("sobolev/B", "h 0.3 and 0.7, rho 0.9 and 0.8: E and L of both planes", 1),
-        total("sobolev/C", "h 0.7 and 0.3, rho 0.2 and 0.6: E and L of both planes", 2),
-        total("sobolev/D", "h 0.5 and 0.5, rho 0.9 and 0.8: E and L of both planes", 3),
+        total("sobolev/A", "h 0.5 and 0.5, rho 0.5 and 0.5: E and L of both planes", 0, 4096),
+        total("sobolev/B", "h 0.3 and 0.7, rho 0.9 and 0.8: E and L of both planes", 1, 4096),
+        total("sobolev/C", "h 0.7 and 0.3, rho 0.2 and 0.6: E and L of both planes", 2, 4096),
+        total("sobolev/D", "h 0.5 and 0.5, rho 0.9 and 0.8: E and L of both planes", 3, 4096),
         order("sobolev/orders-A", "each number of reflections by itself, plain estimate", 0),
         order("sobolev/orders-B", "each number of reflections by itself, plain estimate", 1),
     ]
 }
 
-fn totals(case: &Parameters) -> Result<Vec<Comparison>> {
+fn totals(case: &Parameters, histories: u32) -> Result<Vec<Comparison>> {
     let Parameters { name, h1, rho1, rho2 } = *case;
     let all_rows = rows(SOBOLEV);
     let rows: Vec<_> = all_rows.iter().filter(|r| r["case"] == name && number(r, "r") <= 5.0).collect();
     let seen = |r: f64| r == 0.5 || r == 2.0;
-    let mut job = sobolev(&run(16384, 64), h1, rho1, rho2);
+    let mut job = sobolev(&run(histories, 64), h1, rho1, rho2);
     for (i, row) in rows.iter().enumerate() {
         let r = number(row, "r");
         job += &point(&format!("e1_{i}"), [r, 0.0, 0.0], [0.0, 1.0, 0.0]);
@@ -108,15 +109,17 @@ fn orders(case: &Parameters) -> Result<Vec<Comparison>> {
     let of_plane_1 = table.iter().filter(|row| row["case"] == case.name && row["plane"] == "1");
     let mut all = Vec::new();
     for order in 1..=4 {
-        let found = experiment.estimates_of_orders(order..order + 1);
+        let (_, batches) = experiment.batches(order..order + 1);
+        let found = estimates(&batches);
         for row in of_plane_1.clone().filter(|row| row["order"] == order.to_string()) {
             let Some(i) = RADII.iter().position(|&r| r == number(row, "r")) else { continue };
             let name = format!("order {order}, r = {} m", row["r"]);
             all.push(Comparison::new(name, "lx", found[i][0], number(row, "E_order")));
         }
+        if order == 1 {
+            // All light ends in one of the planes.
+            all.push(Comparison::new("absorbed by both planes", "lm", flux(&batches, "absorbed"), 4.0 * PI));
+        }
     }
-    // All light ends in one of the planes.
-    let absorbed = flux(&experiment.batches(1..2).1, "absorbed");
-    all.push(Comparison::new("absorbed by both planes", "lm", absorbed, 4.0 * PI));
     Ok(all)
 }

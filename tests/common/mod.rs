@@ -1,14 +1,16 @@
 //! Shared by the tests: running a job in this process, the bound of a statistical test, reference tables.
 #![allow(dead_code, unused_imports, reason = "each test binary uses its own part")]
 
+pub mod battery;
 pub mod scenes;
 
 use lampyris::scene::Model;
 pub use lampyris::tally::statistics::Estimate;
+pub use lampyris::validate::Comparison;
 use lampyris::validate::Experiment;
 pub use lampyris::validate::experiment::{estimates, flux};
-pub use lampyris::validate::reference::{number, rows};
-pub use lampyris::validate::{Comparison, reference};
+use lampyris::validate::reference;
+pub use lampyris::validate::reference::number;
 use std::ops::Deref;
 
 /// A job in its scene, ready to run in this process.
@@ -33,6 +35,11 @@ pub fn compare(name: impl ToString, estimate: Estimate, reference: f64) -> Compa
     Comparison::new(name, "", estimate, reference)
 }
 
+/// What is wrong with `c`, one of `comparisons`.
+pub fn verdict(c: &Comparison, comparisons: usize) -> Option<String> {
+    c.failure(comparisons)
+}
+
 /// Every comparison that fails.
 pub fn failures(all: &[Comparison]) -> Vec<String> {
     all.iter().filter_map(|c| c.failure(all.len())).collect()
@@ -48,4 +55,16 @@ pub fn assert_all(all: &[Comparison]) {
     }
     let failures = failures(all);
     assert!(failures.is_empty(), "{} of {} comparisons fail:\n{}", failures.len(), all.len(), failures.join("\n"));
+}
+
+/// Rows of a reference table.
+pub fn table(name: &str) -> Vec<reference::Row> {
+    let table = match name {
+        "sobolev_tables.csv" => reference::SOBOLEV,
+        "sobolev_orders.csv" => reference::SOBOLEV_ORDERS,
+        "sobolev_le_sd.csv" => reference::SOBOLEV_DEVIATIONS,
+        "analytic_cases.csv" => reference::ANALYTIC,
+        other => panic!("no table {other}"),
+    };
+    reference::rows(table)
 }
