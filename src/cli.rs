@@ -1,4 +1,4 @@
-//! Command line: run, plan, work, status, merge. Types only; what they do is in `commands.rs`.
+//! Command line: run, plan, work, status, merge, validate. Types only; what they do is in `commands.rs`.
 //!
 //! Flags say where and with how many processes; none of them changes a number. Only the job does.
 
@@ -81,6 +81,20 @@ pub enum Command {
         /// Folder of the results [default: the first DIR].
         #[arg(short, long, value_name = "OUT")]
         output: Option<PathBuf>,
+    },
+    /// Run cases with an exact answer and print reference, estimate, interval and z; exit code 1 if any fails.
+    #[command(after_help = "Examples:\n  lampyris validate\n  lampyris validate --case sobolev/\n  \
+                      lampyris validate --markdown --note 'Commit abc, two cores.'")]
+    Validate {
+        /// Only the cases whose names contain this.
+        #[arg(long, value_name = "NAME")]
+        case: Option<String>,
+        /// Write the results as a document, too [default: docs/validation.md].
+        #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "docs/validation.md")]
+        markdown: Option<PathBuf>,
+        /// What the document shall say of commit, date and machine.
+        #[arg(long, value_name = "TEXT", requires = "markdown")]
+        note: Option<String>,
     },
 }
 

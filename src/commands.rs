@@ -10,6 +10,8 @@ use lampyris::farm::plan::{Plan, human};
 use lampyris::farm::status::{Status, status};
 use lampyris::farm::worker::{self, Order};
 use lampyris::report;
+use lampyris::validate::{self, Found};
+use std::fs::OpenOptions;
 use std::path::{Path, PathBuf};
 
 /// Checkpoints that `status` reads through, for the goal, at most \[bytes\].
@@ -29,6 +31,8 @@ pub struct Outcome {
 pub enum Exit {
     /// All is done.
     Done = 0,
+    /// Something that was to be shown does not hold.
+    Failed = 1,
     /// Something was refused and said so.
     Refused = 2,
     /// Merged, but batches are missing.
@@ -48,6 +52,7 @@ pub fn execute(command: Command) -> Result<Outcome> {
         Command::Work { dir, shard, threads, parent } => work(&dir, shard, threads, parent),
         Command::Status { dir, json } => show_status(&dir, json),
         Command::Merge { dirs, output } => merge_and_report(&dirs, output),
+        Command::Validate { case, markdown, note } => validate(case.as_deref(), markdown.as_deref(), note.as_deref()),
     }
 }
 
@@ -133,4 +138,48 @@ fn merge_and_report(dirs: &[PathBuf], output: Option<PathBuf>) -> Result<Outcome
     let exit = if merged.missing.is_empty() { Exit::Done } else { Exit::Incomplete };
     let text = format!("{}results in {}\n", report::text_summary(&plan, &merged), output.display());
     Ok(Outcome { text, exit })
+}
+
+/// Runs the cases, shows each as soon as it is done, and writes the document `markdown` if one is wanted.
+fn validate(part: Option<&str>, markdown: Option<&Path>, note: Option<&str>) -> Result<Outcome> {
+    let cases = validate::select(part)?;
+    if let Some(file) = markdown {
+        // Better now than after two minutes; what stands there stays until the battery is through.
+        OpenOptions::new().append(true).create(true).open(file).map_err(Error::io(file))?;
+    }
+    crate::say(&validate::header());
+    let mut found = Vec::new();
+    for case in cases {
+        let case = case.run()?;
+        crate::say(&validate::rows(&case));
+        found.push(case);
+    }
+    if let Some(file) = markdown {
+        std::fs::write(file, validate::markdown(&found, note)).map_err(Error::io(file))?;
+    }
+    Ok(conclusion(&found))
+}
+
+/// The last words on a battery, and exit code 1 if a comparison fails.
+fn conclusion(found: &[Found]) -> Outcome {
+    let exit = if validate::failures(found).is_empty() { Exit::Done } else { Exit::Failed };
+    Outcome { text: validate::summary(found), exit }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use lampyris::validate::select;
+
+    #[test]
+    fn a_wrong_reference_ends_with_exit_code_1() {
+        let case = || select(Some("direct/point-source")).unwrap().remove(0).run().unwrap();
+        let right = conclusion(&[case()]);
+        assert_eq!((right.exit, right.text.contains("FAILS")), (Exit::Done, false), "{}", right.text);
+        let mut wrong = case();
+        wrong.comparisons[0].reference *= 1.001;
+        let outcome = conclusion(&[case(), wrong]);
+        assert_eq!(outcome.exit as u8, 1);
+        assert!(outcome.text.contains("FAILS direct/point-source: horizontal"), "{}", outcome.text);
+    }
 }

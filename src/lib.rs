@@ -58,6 +58,7 @@
 //! | 5 | [`transport`] | the equations: trajectories, direct light, connections | files, threads, shards, pictures |
 //! | 6 | [`farm`] | plan, worker processes, checkpoints, merge | files of results |
 //! | 7 | [`report`] | EXR, CSV, PNG, JSON | how the numbers were made |
+//! | 8 | [`validate`] | cases with an exact answer, run and judged | files, printing |
 //!
 //! The binary (`main`, `cli`, `commands`) joins farm and report. Reading order for the physics: [`transport`], then
 //! [`transport::trajectory`], [`transport::connection`], [`transport::direct`], [`scene`]; for the statistics
@@ -80,3 +81,5 @@ pub mod transport;
 pub mod farm;
 
 pub mod report;
+
+pub mod validate;

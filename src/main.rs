@@ -10,8 +10,7 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     match commands::execute(cli::Cli::parse().command) {
         Ok(outcome) => {
-            // Nobody may be listening (`lampyris plan ... | head`): the work is done all the same.
-            let _ = std::io::stdout().write_all(outcome.text.as_bytes());
+            say(&outcome.text);
             ExitCode::from(outcome.exit as u8)
         }
         Err(error) => {
@@ -19,4 +18,9 @@ fn main() -> ExitCode {
             ExitCode::from(error.exit_code())
         }
     }
+}
+
+/// Prints on standard output. Nobody may be listening (`lampyris plan ... | head`): the work is done all the same.
+fn say(text: &str) {
+    let _ = std::io::stdout().write_all(text.as_bytes());
 }

@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Top modules, lowest first. `error` may be imported by all, `cli` and `commands` belong to the binary.
-const LAYERS: [&[&str]; 8] = [
+const LAYERS: [&[&str]; 9] = [
     &["error"],
     &["math"],
     &["random", "photometry"],
@@ -15,6 +15,7 @@ const LAYERS: [&[&str]; 8] = [
     &["transport"],
     &["farm"],
     &["report"],
+    &["validate"],
 ];
 
 /// Inside `farm`, lowest first; modules of one row do not know each other.

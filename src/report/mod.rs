@@ -44,6 +44,7 @@ mod summary;
 mod text;
 mod values;
 
+pub use number::short;
 pub use png::MAP_ORIGIN;
 pub use text::text_summary;
 

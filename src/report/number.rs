@@ -1,7 +1,7 @@
 //! Numbers for human eyes. Files for machines print every digit instead.
 
 /// `x` with `digits` significant digits: plain between 1e-4 and 1e6, with a power of ten elsewhere.
-pub(super) fn short(x: f64, digits: usize) -> String {
+pub fn short(x: f64, digits: usize) -> String {
     if x == 0.0 || !x.is_finite() {
         return format!("{x:?}").trim_end_matches(".0").to_owned();
     }
