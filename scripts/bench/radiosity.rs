@@ -148,9 +148,8 @@ impl Patches {
         self.planes = [direct.clone(), direct.clone()];
         for sweep in 1.. {
             let mut change = 0f64;
-            for plane in 0..2 {
-                for i in 0..count {
-                    let row = &kernels[plane][i * count..(i + 1) * count];
+            for (plane, kernels) in kernels.iter().enumerate() {
+                for (i, row) in kernels.chunks_exact(count).enumerate() {
                     let value = direct[i] + RHO * dot(row, &self.planes[1 - plane]);
                     let old = std::mem::replace(&mut self.planes[plane][i], value);
                     change = change.max((value / old - 1.0).abs());
