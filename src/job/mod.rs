@@ -57,13 +57,20 @@ pub struct Job {
     pub sources: Vec<Source>,
 }
 
+/// Default histories of a batch in a job with maps.
+const HISTORIES_OF_MAPS: u64 = 16;
+/// The same in a job of lux-meters alone.
+const HISTORIES_OF_METERS: u64 = 1024;
+
 /// `[run]`: seed, division of work and confidence.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Run {
     /// Seed of every random number, 0 ..= 2^63-1.
     pub seed: u64,
-    /// Histories of one batch; a batch is one realization, the unit of the variance.
+    /// Histories of one batch; a batch is one realization, the unit of the variance. Left out: 16 with cameras or
+    /// goniometers, whose pixels need many positions, and so many batches; else 1024, because a quasi-random set gains
+    /// with its size (docs/benchmarks.md).
     pub histories_per_batch: u64,
     /// Number of batches of the whole job; with `[stop]` its `max_batches`, and not to be typed.
     pub batches: u64,
@@ -83,7 +90,7 @@ impl Default for Run {
     fn default() -> Self {
         Run {
             seed: 1,
-            histories_per_batch: 64,
+            histories_per_batch: HISTORIES_OF_METERS,
             batches: 256,
             batches_per_shard: 32,
             sampling: Sampling::Rqmc,
@@ -262,9 +269,13 @@ impl Job {
             let field = e.path().to_string();
             syntax_error(file, text, &field, e.inner())
         })?;
+        let typed = Typed::of(text);
         if let Some(stop) = &job.stop {
-            check::check_typed_batches(typed_batches(text), stop, file)?;
+            check::check_typed_batches(typed.batches, stop, file)?;
             job.run.batches = stop.max_batches;
+        }
+        if typed.histories_per_batch.is_none() && job.has_maps() {
+            job.run.histories_per_batch = HISTORIES_OF_MAPS;
         }
         check::check(&job, file)?;
         Ok(job)
@@ -273,6 +284,11 @@ impl Job {
     /// The field that says how many batches the job has at most.
     pub fn batches_field(&self) -> &'static str {
         if self.stop.is_some() { "stop.max_batches" } else { "run.batches" }
+    }
+
+    /// True with cameras or goniometers among the receivers.
+    fn has_maps(&self) -> bool {
+        !(self.cameras.is_empty() && self.gonios.is_empty())
     }
 
     /// All receiver sets in the order of the tallies: cameras, gonios, grids, points, regions.
@@ -286,17 +302,21 @@ impl Job {
     }
 }
 
-/// `run.batches` if it stands in the job file: a default is not what somebody typed.
-fn typed_batches(text: &str) -> Option<u64> {
-    #[derive(Deserialize)]
-    struct Typed {
-        run: Option<TypedRun>,
+/// What stands in `[run]` of the job file: a default is not what somebody typed.
+#[derive(Default, Deserialize)]
+struct Typed {
+    batches: Option<u64>,
+    histories_per_batch: Option<u64>,
+}
+
+impl Typed {
+    fn of(text: &str) -> Self {
+        #[derive(Deserialize)]
+        struct File {
+            run: Option<Typed>,
+        }
+        toml::from_str::<File>(text).ok().and_then(|file| file.run).unwrap_or_default()
     }
-    #[derive(Deserialize)]
-    struct TypedRun {
-        batches: Option<u64>,
-    }
-    toml::from_str::<Typed>(text).ok()?.run?.batches
 }
 
 fn whole() -> f64 {
