@@ -63,7 +63,7 @@ pub enum Command {
         #[arg(long, value_name = "PID", hide = true)]
         parent: Option<i32>,
     },
-    /// Say how far a folder is, from checkpoint headers alone.
+    /// Say how far a folder is, from checkpoint headers; of a goal, whether it is reached, where that is quickly read.
     #[command(after_help = "Example:\n  lampyris status out/room --json")]
     Status {
         /// Folder of the plan.

@@ -5,14 +5,17 @@ use lampyris::error::{Error, Result};
 use lampyris::farm::coordinator::{self, Options};
 use lampyris::farm::folder::{Folder, plan_text};
 use lampyris::farm::inputs::{Prepared, prepare};
-use lampyris::farm::merge::merge;
+use lampyris::farm::merge::{goal_reached, merge};
 use lampyris::farm::plan::{Plan, human};
-use lampyris::farm::status::status;
+use lampyris::farm::status::{Status, status};
 use lampyris::farm::worker::{self, Order};
 use lampyris::report;
 use lampyris::validate::{self, Found};
 use std::fs::OpenOptions;
 use std::path::{Path, PathBuf};
+
+/// Checkpoints that `status` reads through, for the goal, at most \[bytes\].
+const CHEAP: u64 = 256 << 20;
 
 /// What a command says and how it ends.
 #[derive(Debug)]
@@ -55,7 +58,9 @@ pub fn execute(command: Command) -> Result<Outcome> {
 
 fn run(job: &Path, output: Option<PathBuf>, options: Options) -> Result<Outcome> {
     let (folder, plan) = establish(job, output)?;
-    let before = match coordinator::run(&folder, &plan, options)? {
+    let reached = |folder: &Folder| Ok(goal_reached(std::slice::from_ref(folder))?.is_some());
+    let before = match coordinator::run(&folder, &plan, options, &reached)? {
+        coordinator::Ended::WasDone if plan.job.stop.is_some() => "nothing was left to do\n".to_owned(),
         coordinator::Ended::WasDone => format!("all {} batches were done before\n", plan.job.run.batches),
         coordinator::Ended::Done => String::new(),
         coordinator::Ended::Stopped => {
@@ -101,11 +106,27 @@ fn work(dir: &Path, shard: u64, threads: Option<usize>, parent: Option<i32>) -> 
 }
 
 fn show_status(dir: &Path, json: bool) -> Result<Outcome> {
-    let status = status(&Folder::new(dir))?;
+    let folder = Folder::new(dir);
+    let mut status = status(&folder)?;
+    if status.refused.is_empty() && looks_cheap(&folder, &status)? {
+        match goal_reached(&[folder]) {
+            Ok(reached) => status.judge(reached),
+            Err(e @ Error::Refused { .. }) => status.refused.push(e.to_string()),
+            Err(e) => return Err(e),
+        }
+    }
     let exit = if status.refused.is_empty() { Exit::Done } else { Exit::Refused };
     let shown = |e| Error::Failed(format!("status has no JSON form: {e}"));
     let text = if json { serde_json::to_string_pretty(&status).map_err(shown)? + "\n" } else { status.to_string() };
     Ok(Outcome { text, exit })
+}
+
+/// True when a look has come and little has to be read for it.
+fn looks_cheap(folder: &Folder, status: &Status) -> Result<bool> {
+    let Some(look) = status.goal.and_then(|goal| goal.last_look) else { return Ok(false) };
+    let plan = folder.read_plan()?;
+    let shards = look.div_ceil(plan.job.run.batches_per_shard);
+    Ok(plan.sizes().checkpoint.saturating_mul(shards) <= CHEAP)
 }
 
 fn merge_and_report(dirs: &[PathBuf], output: Option<PathBuf>) -> Result<Outcome> {

@@ -50,7 +50,7 @@
 //! |---|---|---|---|
 //! | 0 | [`error`] | one error type, and its exit codes | |
 //! | 1 | [`math`] | the only door to transcendental functions | |
-//! | 2 | [`random`], [`photometry`] | (seed, domain, index) to generator; colours | files, histories |
+//! | 2 | [`random`], [`photometry`] | (seed, domain, index) to generator, quasi-random points; colours | files, histories |
 //! | 3 | [`job`] | the job file, every value checked | scenes, threads |
 //! | 3 | [`geometry`] | closest hit, mutual visibility | light, reflectance, pixels |
 //! | 4 | [`tally`] | scores of a batch, moments, statistics | what it counts, and where |

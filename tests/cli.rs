@@ -11,6 +11,7 @@ const JOB: &str = r#"
 histories_per_batch = 1
 batches = 4
 batches_per_shard = 2
+sampling = "random"
 [[camera]]
 name = "view"
 eye = [0.0, 1.0, 3.0]
@@ -86,6 +87,18 @@ fn bad_values_in_a_job_are_named_with_field_value_and_range() {
         ("batches = 4", "batches = 0", "run.batches = 0: 1 .. 4294967296"),
         ("batches = 4", "batches = -4", "run.batches (line 4) = batches = -4: invalid value: integer `-4`"),
         ("batches = 4", "batches = \"many\"", "run.batches (line 4) = batches = \"many\": invalid type: string"),
+        ("sampling = \"random\"", "", "run.batches = 4: at least 16; any number with sampling = \"random\""),
+        ("sampling = \"random\"", "sampling = \"sobol\"", "unknown variant `sobol`, expected `rqmc` or `random`"),
+        (
+            "histories_per_batch = 1\nbatches = 4\nbatches_per_shard = 2\nsampling = \"random\"",
+            "histories_per_batch = 2000\nbatches = 16",
+            "run.histories_per_batch = 2000: a power of two: 1024 or 2048; any number with sampling = \"random\"",
+        ),
+        (
+            "histories_per_batch = 1\nbatches = 4\nbatches_per_shard = 2\nsampling = \"random\"",
+            "histories_per_batch = 1048575\nbatches = 16",
+            "a power of two: 524288 or 1048576;",
+        ),
         ("[run]", "[run]\nseed = -1", "run.seed (line 3) = seed = -1: invalid value"),
         ("[run]", "[run]\nhistories = 3", "run.histories (line 3) = histories = 3: unknown field `histories`"),
         ("[run]", "[run]\nconfidence = 1.0", "run.confidence = 1: between 0 and 1, exclusive"),
@@ -114,7 +127,7 @@ fn bad_values_in_a_job_are_named_with_field_value_and_range() {
         ),
         ("name = \"floor\"", "name = \"view\"", "name = view: a name used only once"),
         ("name = \"floor\"", "name = \"../floor\"", "name = ../floor: 1 .. 64 letters, digits"),
-        ("name = \"floor\"", "name = \"summary\"", "name = summary: any name but points, summary and flux"),
+        ("name = \"floor\"", "name = \"summary\"", "name = summary: any name but points, regions, summary and flux"),
         ("normal = [0.0, 1.0, 0.0]\ncolumns", "normal = [0, 0, 0]\ncolumns", "grid[0].normal = [0.0, 0.0, 0.0]: three"),
         ("columns = 2", "columns = 70000", "grid[0].columns = 70000: 1 .. 65536"),
         ("columns = 2\nrows = 2", "columns = 16000\nrows = 16000", "grid[0].keep_batches = true (\"floor\", with the"),
@@ -129,6 +142,35 @@ fn bad_values_in_a_job_are_named_with_field_value_and_range() {
         ("radius = 1.0", "radius = 0.0", "sphere[0].radius = 0: above 0, at most 1e6"),
         ("facing = \"outward\"", "facing = \"up\"", "unknown variant `up`, expected `inward` or `outward`"),
         ("kind = \"omni\"", "kind = \"laser\"", "unknown variant `laser`, expected `omni`"),
+        ("[run]", "[stop]\nrelative_half_width = 0\nmax_batches = 4\n[run]", "stop.relative_half_width = 0: between"),
+        ("[run]", "[stop]\nrelative_half_width = nan\nmax_batches = 4\n[run]", "stop.relative_half_width = NaN: betw"),
+        ("[run]", "[stop]\nrelative_half_width = 0.1\n[run]", "missing field `max_batches`"),
+        (
+            "[run]",
+            "[stop]\nrelative_half_width = 0.1\nmax_batches = 4\n[run]",
+            "stop.max_batches = 4: 16 .. 4294967296",
+        ),
+        (
+            "[run]",
+            "[stop]\nrelative_half_width = 0.1\nmax_batches = 20\n[run]",
+            "run.batches = 4: absent with [stop], whose max_batches = 20 is the limit",
+        ),
+        (
+            "[run]\nhistories_per_batch = 1\nbatches = 4\nbatches_per_shard = 2",
+            "[stop]\nrelative_half_width = 0.1\nmax_batches = 20\n[run]\nbatches_per_shard = 32",
+            "stop.max_batches = 20: at least 32, the first look: whole shards of run.batches_per_shard",
+        ),
+        (
+            "[run]",
+            "[stop]\nrelative_half_width = 0.1\nmax_batches = 4\nshare = 0\n[run]",
+            "stop.share = 0: above 0 and",
+        ),
+        ("[run]", "[stop]\nrelative_half_width = 0.1\nmax_batches = 4\nshare = 1.1\n[run]", "stop.share = 1.1: above"),
+        (
+            "batches = 4\nbatches_per_shard = 2",
+            "batches_per_shard = 2\n[stop]\nrelative_half_width = 0.1\nmax_batches = 99\nreceivers = [\"dask\"]",
+            "stop.receivers[0] = dask: one of view, eye, floor, desk",
+        ),
         ("[run]", "scene = \"gone.glb\"\n[run]", "scene = gone.glb: a .glb or .gltf file, relative to the job file"),
     ];
     for (from, to, fragment) in cases {
@@ -247,6 +289,37 @@ fn a_checkpoint_that_is_none_stops_everything_and_stays() {
 }
 
 #[test]
+fn a_goal_fills_in_the_number_of_batches_of_the_plan() {
+    let goal = |batches: &str| {
+        let stop = format!("{batches}batches_per_shard = 2\n[stop]\nrelative_half_width = 0.1\nmax_batches = 99\n");
+        folder_with(&JOB.replacen("batches = 4\nbatches_per_shard = 2\n", &stop, 1))
+    };
+    for typed in ["", "batches = 99\n"] {
+        let folder = goal(typed);
+        let said = expect(folder.path(), 0, &["plan", "job.toml", "-o", "out"]);
+        assert!(said.contains("\nbatches = 99\n") && said.contains("\nmax_batches = 99\n"), "{said}");
+        let said = expect(folder.path(), 0, &["status", "out"]);
+        assert!(said.contains("0 of 99 batches") && said.contains("\nnext look at 16 batches\n"), "{said}");
+        // The limit may be raised, not lowered.
+        for (limit, code, fragment) in
+            [("120", 0, "batches = 120"), ("50", 2, "stop.max_batches: 120 in the plan, 50 now")]
+        {
+            let text = fs::read_to_string(folder.path().join("job.toml")).unwrap();
+            fs::write(folder.path().join("other.toml"), text.replace("= 99", &format!("= {limit}"))).unwrap();
+            let said = expect(folder.path(), code, &["plan", "other.toml", "-o", "out"]);
+            assert!(said.contains(fragment), "{said}");
+        }
+    }
+    let folder = goal("");
+    expect(folder.path(), 0, &["plan", "job.toml", "-o", "out"]);
+    let path = folder.path().join("out/plan.toml");
+    let text = fs::read_to_string(&path).unwrap();
+    fs::write(&path, text.replace("\nbatches = 99\n", "\nbatches = 98\n")).unwrap();
+    let said = expect(folder.path(), 2, &["status", "out"]);
+    assert!(said.contains("run.batches = 98: absent with [stop]"), "{said}");
+}
+
+#[test]
 fn a_scene_that_cannot_be_read_beside_its_job_is_named() {
     let folder = folder_with(&format!("scene = \"../gone/room.glb\"\n{JOB}"));
     let said = expect(folder.path(), 2, &["run", "job.toml", "-q"]);
@@ -262,4 +335,57 @@ fn a_fault_that_names_no_step_is_refused() {
     assert_eq!(output.status.code(), Some(2));
     let said = String::from_utf8(output.stderr).unwrap();
     assert!(said.contains("LAMPYRIS_FAULT = sometime:1: <step>:<count> with a step among after-create"), "{said}");
+}
+
+#[test]
+fn regions_and_ratios_are_checked_as_all_else() {
+    let good = "[[region]]\nname = \"wall\"\ncamera = \"view\"\nrectangle = [1, 1, 2, 2]\n\
+                [[ratio]]\nname = \"part\"\nnumerator = \"wall\"\ndenominator = \"floor\"\n\
+                [[ratio]]\nname = \"whole\"\nnumerator = \"desk\"\ndenominator = \"floor\"\n";
+    let rectangle = "region[0].rectangle = ";
+    let cases = [
+        ("camera = \"view\"", "camera = \"eye\"", "region[0].camera = eye: the name of a [[camera]]: view"),
+        ("[1, 1, 2, 2]", "[1, 1, 4, 2]", "[1, 1, 4, 2]: column, row, columns, rows of at least one pixel inside 4 x 3"),
+        ("[1, 1, 2, 2]", "[1, 1, 0, 2]", rectangle),
+        ("[1, 1, 2, 2]", "[4294967295, 1, 4294967295, 2]", rectangle),
+        ("[1, 1, 2, 2]", "[1, 1, 2]", "invalid length 3"),
+        ("rectangle = [1, 1, 2, 2]", "", "region[0] = (both or neither): either rectangle or node"),
+        ("[1, 1, 2, 2]", "[1, 1, 2, 2]\nnode = \"Table\"", "region[0] = (both or neither): either rectangle or node"),
+        ("rectangle = [1, 1, 2, 2]", "node = \"Table\"", "region[0].node = Table: a node only with a scene"),
+        ("name = \"wall\"", "name = \"regions\"", "name = regions: any name but points, regions, summary and flux"),
+        ("name = \"wall\"", "name = \"desk\"", "name = desk: a name used only once"),
+        ("name = \"part\"", "name = \"a/b\"", "ratio[0].name = a/b: 1 .. 64 letters, digits, '_' or '-'"),
+        ("name = \"whole\"", "name = \"Part\"", "ratio[1].name = Part: a name used for only one ratio"),
+        (
+            "numerator = \"wall\"",
+            "numerator = \"view\"",
+            "ratio[0].numerator = view: a grid with keep_batches, a point",
+        ),
+        ("denominator = \"floor\"", "denominator = \"no\"", "a point or a region: floor, desk, wall"),
+        ("denominator = \"floor\"", "", "missing field `denominator`"),
+    ];
+    let folder = folder_with(&format!("{JOB}{good}"));
+    expect(folder.path(), 0, &["plan", "job.toml", "-o", "out"]);
+    for (from, to, fragment) in cases {
+        assert!(good.contains(from), "{from}");
+        let folder = folder_with(&format!("{JOB}{}", good.replacen(from, to, 1)));
+        let said = expect(folder.path(), 2, &["plan", "job.toml", "-o", "out"]);
+        assert!(said.contains(fragment) && said.contains("job.toml"), "{to}\n  expected {fragment}\n  said {said}");
+    }
+}
+
+#[test]
+fn ratios_may_change_after_the_fact_and_regions_may_not() {
+    let region = "[[region]]\nname = \"wall\"\ncamera = \"view\"\nrectangle = [1, 1, 2, 2]\n";
+    let ratio = "[[ratio]]\nname = \"r\"\nnumerator = \"wall\"\ndenominator = \"floor\"\n";
+    let folder = folder_with(&format!("{JOB}{region}"));
+    let at = folder.path();
+    expect(at, 0, &["run", "job.toml", "-o", "out", "-q"]);
+    fs::write(at.join("more.toml"), format!("{JOB}{region}{ratio}")).unwrap();
+    let said = expect(at, 0, &["run", "more.toml", "-o", "out", "-q"]);
+    assert!(said.contains("all 4 batches were done before") && said.contains("r: wall / floor = "), "{said}");
+    assert!(said.contains("    wall: mean ") && at.join("out/regions.csv").exists(), "{said}");
+    fs::write(at.join("other.toml"), format!("{JOB}{}", region.replace("[1, 1, 2, 2]", "[0, 1, 2, 2]"))).unwrap();
+    let said = expect(at, 2, &["run", "other.toml", "-o", "out", "-q"]);
+    assert!(said.contains("region[0].rectangle: [1,1,2,2] in the plan, [0,1,2,2] now"), "{said}");
 }

@@ -39,7 +39,7 @@ fn far_cameras_see_every_triangle() {
     }
     for height in [1e2, 1e4, 1e6] {
         let degrees = 2.0 * 180.0 / PI * lampyris::math::atan2(8.0, height);
-        let job = run(1, 1)
+        let job = run(1, 16)
             + &format!(
                 "[[camera]]\nname = \"c\"\neye = [0, {height:?}, 0]\ntarget = [0, 0, 0]\nup = [0, 0, 1]\n\
                  vertical_fov_degrees = {degrees:?}\nwidth = 128\nheight = 128\npixel_samples = 1\n"

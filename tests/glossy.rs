@@ -10,7 +10,7 @@ use lampyris::math::{DVec3, PI, to_world};
 use lampyris::photometry::Colour;
 use lampyris::random::{Domain, Generator, Stream, cosine_hemisphere};
 use lampyris::scene::{Model, Reflectance, Scene, Surface};
-use lampyris::transport::connection::{Connected, Connectors, Link, Rule, Tile, connect};
+use lampyris::transport::connection::Connectors;
 use lampyris::transport::receiver::{Receiver, Response};
 use lampyris::transport::trajectory::trace;
 
@@ -131,19 +131,9 @@ fn assert_same_point_is_exact(case: &Case, meter: Receiver) {
     let response =
         Response::Reflectance { primitive: floor.primitive, to_eye, attenuation: Colour::WHITE, carried: 0.0 };
     let histories = histories(case, 256);
-    let connected = connect_plainly(&case, &histories, &[meter, Receiver { response, ..meter }]);
+    let connected = common::connect(&case.scene, &histories, f64::INFINITY, &[meter, Receiver { response, ..meter }]);
     let (e, l) = (connected[0].sum.luminance(), connected[1].sum.luminance());
     assert!(e > 0.0 && (l / (0.37 / PI * e) - 1.0).abs() < 1e-14, "{l} and {e}");
-}
-
-/// All histories connected to `receivers` without bound.
-fn connect_plainly(case: &Case, histories: &Connectors, receivers: &[Receiver]) -> Vec<Connected> {
-    let links = receivers.iter().enumerate().map(|(owner, &receiver)| Link { owner, receiver }).collect();
-    let tile = Tile::new(&case.scene, links, 0);
-    let rule = Rule { bound: f64::INFINITY, channels: 1, orders: 0..u32::MAX };
-    let mut connected = vec![Connected::default(); receivers.len()];
-    connect(&case.scene, histories, 0..histories.histories(), &[&tile], &rule, &mut connected);
-    connected
 }
 
 fn histories(case: &Case, count: u64) -> Connectors {
@@ -196,7 +186,7 @@ fn glossy_receiver_in_a_white_furnace() {
             trace(&case.scene, &case.job.transport, &mut stream.generator(history), &mut vertices);
             connectors.push(&case.scene, &vertices);
         }
-        let connected = connect_plainly(&case, &connectors, &receivers);
+        let connected = common::connect(&case.scene, &connectors, f64::INFINITY, &receivers);
         connected.iter().map(|c| c.sum.luminance() / count as f64).collect::<Vec<_>>()
     };
     let scores: Vec<Vec<f64>> = (0..batches).map(batch).collect();

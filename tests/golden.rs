@@ -12,8 +12,8 @@ use std::process::Command;
 /// NUMERICS, digest of the plan, digest of the results of `tests/exactness/job.toml`.
 const GOLDEN: (u32, &str, &str) = (
     1,
-    "2bd2927ee219cbd533074da8771c1c8cfda51edc31bfa1a4188f10f3b772b332",
-    "e125ee4f62640bb0352c5abacbb93deb6601d18521712e668cd86fd82b41c5ed",
+    "ca3118f346ceab17c8e59fb83724fe550f032682130f6947d938fe5f0798079b",
+    "354b880724167eb4c02c1629984056fbdd90c7ede121fb3eb50548d23966b31a",
 );
 
 #[test]

@@ -103,7 +103,7 @@ fn polished_dielectric_is_mirror_and_diffuse_at_once() {
 
 #[test]
 fn trajectories_that_never_end_are_lost_and_told() {
-    let job = "[run]\nbatches = 1\nhistories_per_batch = 2\n".to_owned()
+    let job = "[run]\nbatches = 1\nhistories_per_batch = 2\nsampling = \"random\"\n".to_owned()
         + &omni([0.5, 0.4, 0.6])
         + &point("e", [0.5, 0.0, 0.5], [0.0, 1.0, 0.0]);
     let (_, batches) = Case::new(&job, closed_box(DVec3::ONE, &lambert(1.0, 0.0))).batches(1..2);

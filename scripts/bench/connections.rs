@@ -6,9 +6,10 @@
 use lampyris::farm::pilot::bounds;
 use lampyris::farm::realization::Realization;
 use lampyris::job::Job;
+use lampyris::random::sobol::PointSet;
 use lampyris::random::{Domain, Stream};
 use lampyris::scene::{Model, Scene, gltf};
-use lampyris::transport::trajectory::trace;
+use lampyris::transport::trajectory::{Vertex, trace};
 use nix::time::{ClockId, clock_gettime};
 use std::time::Duration;
 
@@ -21,6 +22,7 @@ fn main() {
         for (name, side) in [("room", 128), ("cornell", 128), ("blender_room", 64)] {
             bench(name, side);
         }
+        points();
     });
 }
 
@@ -32,7 +34,7 @@ fn bench(name: &str, side: u32) {
     );
     let job = Job::parse(&text, "bench").expect("the job is right");
     let scene = Scene::new(load(name), &job).expect("the scene is right");
-    let mut vertices = Vec::new();
+    let mut vertices: Vec<Vertex> = Vec::new();
     let trajectories = Stream::new(job.run.seed, Domain::Trajectory, "");
     let per_history = median(|| {
         vertices.clear();
@@ -57,6 +59,24 @@ fn bench(name: &str, side: u32) {
         per_history * 1e6,
         per_batch / HISTORIES as f64
     );
+}
+
+/// Scrambled Sobol points, the eight coordinates of a history.
+fn points() {
+    let scrambling = Stream::new(1, Domain::Scrambling, "");
+    for m in [6, 11, 16] {
+        let seconds = median(|| {
+            let start = thread_time();
+            let batches = (1 << 18) >> m;
+            let of_batch = |batch: u64| -> f64 {
+                let set = PointSet::new(&scrambling, batch, m);
+                (0..1 << m).map(|i| set.point(i).iter().sum::<f64>()).sum()
+            };
+            std::hint::black_box((0..batches).map(of_batch).sum::<f64>());
+            (thread_time() - start).as_secs_f64()
+        });
+        println!("quasi-random points in sets of 2^{m}: {:.0} ns each", seconds / f64::from(1 << 18) * 1e9);
+    }
 }
 
 fn load(name: &str) -> Model {

@@ -15,7 +15,7 @@ fn main() {
     let scene = root.join("scenes/room.glb").display().to_string();
     let job = room
         .replace("../scenes/room.glb", &scene)
-        .replace("\nbatches = 64", "\nbatches = 8")
+        .replace("\nbatches = 64", "\nbatches = 8\nsampling = \"random\"")
         .replace("\nbatches_per_shard = 16", "\nbatches_per_shard = 4");
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("room.toml");

@@ -16,9 +16,10 @@ import sys
 from pathlib import Path
 
 CHANNELS = """R G B luminance.Y luminance.variance luminance.standardError luminance.ciLower luminance.ciUpper
-luminance.peak direct.Y""".split()
+luminance.peak luminance.health direct.Y""".split()
 ATTRIBUTES = {
     "units": "cd/m2",
+    "estimate": "bounded",
     "confidence": "0.95",
     "batches": "16",
     "histories": "256",
@@ -72,7 +73,7 @@ def word(pattern, text):
 def read(path, width, height):
     """Pixels as OpenImageIO decodes them: {(column, row): {channel: value}}."""
     text = output_of("oiiotool", "--info", "-v", "--dumpdata", str(path))
-    expect(re.search(rf": +{width} x +{height}, 10 channel, float openexr", text), f"{path.name}: size or type")
+    expect(re.search(rf": +{width} x +{height}, {len(CHANNELS)} channel, float openexr", text), f"{path.name}: size or type")
     names = word(r"channel list: (.*)", text).split(", ")
     if sorted(names) != sorted(CHANNELS):
         sys.exit(f"{path.name}: OpenImageIO finds the channels {names}")
@@ -117,7 +118,10 @@ def check_against_summary(name, pixels, stated):
 def check_consistency(name, pixels):
     """The layers of a pixel belong together."""
     for at, p in pixels.items():
-        y, error = p["luminance.Y"], p["luminance.standardError"]
+        y, error, health = p["luminance.Y"], p["luminance.standardError"], p["luminance.health"]
+        expect(math.isfinite(health) == math.isfinite(y), f"{name} {at}: health {health} of luminance {y}")
+        if math.isfinite(health):
+            check_health(f"{name} {at}", p)
         if not (math.isfinite(y) and math.isfinite(error)):
             continue
         grey = p["R"] == p["G"] == p["B"] == y
@@ -127,6 +131,16 @@ def check_consistency(name, pixels):
         variance = abs(p["luminance.variance"] - error * error) < 4 * F32 * error * error + 4 * PRINTED
         shares = 0.0 <= p["direct.Y"] and -PRINTED <= p["luminance.peak"] <= 1.0 + PRINTED
         expect(grey and interval and variance and shares and error >= 0.0, f"{name} {at}: layers disagree: {p}")
+
+
+def check_health(at, p):
+    """The marks of 16 batches are those that the other layers ask for: 1 no information, 4 relative error, 8 peak."""
+    y, error, peak, health = p["luminance.Y"], p["luminance.standardError"], p["luminance.peak"], p["luminance.health"]
+    large_error = error > 0.1 * y  # false for NaN
+    large_peak = error != 0.0 and peak > 0.05
+    due = 1 if math.isnan(error) else 4 * large_error + 8 * large_peak
+    near_limit = abs(error - 0.1 * y) < 1e-5 * y or abs(peak - 0.05) < 1e-5
+    expect(health == due or near_limit, f"{at}: health {health}, the layers ask for {due}")
 
 
 def check_orientation(view):

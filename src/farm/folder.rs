@@ -175,6 +175,7 @@ fn check_plan(plan: &Plan, path: &Path) -> Result<()> {
         return Err(Error::refused(path, "edited or damaged: the name of the job has control characters"));
     }
     plan.check_sizes()?;
+    plan.check_looks()?;
     let job = toml::to_string(&plan.job).map_err(|e| Error::refused(path, e))?;
     Job::parse(&job, &path.display().to_string()).map(|_| ())
 }

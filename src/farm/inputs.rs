@@ -5,6 +5,7 @@ use super::folder::Folder;
 use super::pilot::bounds;
 use super::plan::{Input, Plan, SceneSummary};
 use super::receivers::ReceiverSet;
+use super::regions::Regions;
 use crate::error::{Error, Result};
 use crate::job::Job;
 use crate::scene::{Model, Scene, gltf};
@@ -41,6 +42,7 @@ pub fn prepare(path: &Path) -> Result<Prepared> {
     let mut summary = summary(&scene);
     summary.warnings.extend(lift_warning(&scene));
     summary.warnings.extend(ReceiverSet::check(&job, &scene, &file)?);
+    Regions::check(&job, &scene, &file)?;
     let bounds = bounds(&job, &scene);
     let plan = Plan::new(&name, job, job_file.clone(), inputs, summary, bounds)?;
     files.push((job_file, text.into_bytes()));

@@ -8,6 +8,7 @@
 //! inputs        files -> plan, scene
 //! ordering      which bins share tiles
 //! receivers     bins of a job -> receivers in a scene
+//! regions       parts of maps, one number a batch
 //! pilot         the bound of the kernel, fixed before the run
 //! realization   batch index -> scores: the only parallel computation
 //! checkpoint    one durable file for each shard
@@ -28,6 +29,7 @@ pub mod pilot;
 pub mod plan;
 pub mod realization;
 mod receivers;
+mod regions;
 pub mod status;
 pub mod worker;
 

@@ -16,7 +16,7 @@ use crate::transport::receiver::Receiver;
 use crate::transport::trajectory::{Vertex, trace};
 
 /// c: chosen by measured figure of merit (docs/benchmarks.md).
-const SCORE_OF_A_HISTORY: f64 = 2.0;
+const SCORE_OF_A_HISTORY: f64 = 3.0;
 /// Trajectories of a pilot.
 const TRAJECTORIES: u64 = 1024;
 /// Bins of a set at which a pilot estimates, at most.
@@ -43,7 +43,7 @@ pub fn bounds(job: &Job, scene: &Scene) -> Vec<f64> {
 /// True when no trajectory of a pilot leaves the scene.
 fn is_closed(job: &Job, scene: &Scene) -> bool {
     let stream = Stream::new(job.run.seed, Domain::Pilot, "");
-    let escaped = |i| trace(scene, &job.transport, &mut stream.generator(i), &mut Vec::new()).escaped;
+    let escaped = |i| trace(scene, &job.transport, &mut stream.generator(i), &mut Vec::<Vertex>::new()).escaped;
     !scene.geometry.is_unbounded() && (0..TRAJECTORIES).all(|i| escaped(i) == 0.0)
 }
 

@@ -2,16 +2,19 @@
 //!
 //! A batch is computed from its index alone. Its histories are traced in parallel and collected in index order;
 //! then every tile of receivers sums all vertices in index order, so any number of threads gives the same bits.
+//! The other estimators keep to this: a bin follows its own paths, a grid counts the histories in index order.
 //! Each receiver set keeps the order in which its bins share tiles, found once from the centres of its bins.
 
 use super::ordering::kd_order;
-use super::receivers::{ReceiverSet, TileScores};
-use crate::job::{Channels, Job};
+use super::receivers::{CentreSight, ReceiverSet, TileScores};
+use super::regions::Regions;
+use crate::job::{Channels, Estimator, Job, Sampling};
+use crate::random::sobol::PointSet;
 use crate::random::{Domain, Stream};
 use crate::scene::Scene;
 use crate::tally::{BatchScores, Scores};
 use crate::transport::connection::{Connectors, TILE};
-use crate::transport::trajectory::{FluxBalance, Vertex, trace};
+use crate::transport::trajectory::{FluxBalance, Record, Segment, Vertex, trace};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -22,11 +25,14 @@ const HISTORIES_AT_ONCE: u64 = 64;
 pub struct Realization<'a> {
     job: &'a Job,
     scene: &'a Scene,
+    /// All receiver sets but the regions, which come last.
     sets: Vec<ReceiverSet>,
+    regions: Regions,
     /// For each set its bins in the order in which they share tiles.
     orders_of_bins: Vec<Vec<u32>>,
     fixed_direct: Vec<Vec<f64>>,
     trajectories: Stream,
+    scrambling: Stream,
     orders: Range<u32>,
 }
 
@@ -35,9 +41,15 @@ impl<'a> Realization<'a> {
     pub fn new(job: &'a Job, scene: &'a Scene, bounds: &[f64]) -> Self {
         let sets = ReceiverSet::all(job, scene, bounds);
         let orders_of_bins = sets.iter().map(|s| order_of_bins(s, scene)).collect();
-        let fixed_direct = sets.iter().map(|s| fixed_direct(s, scene)).collect();
+        let regions = Regions::place(job, scene, "", centres).expect("regions were placed when the job was planned");
+        let fixed = |set: &ReceiverSet| fixed_direct(set, scene, job.transport.estimator);
+        let mut fixed_direct: Vec<Vec<f64>> = sets.iter().map(fixed).collect();
+        // A map has no direct light that is the same in every batch, and so has no region.
+        fixed_direct.resize_with(sets.len() + regions.len(), Vec::new);
         let trajectories = Stream::new(job.run.seed, Domain::Trajectory, "");
-        Realization { job, scene, sets, orders_of_bins, fixed_direct, trajectories, orders: 1..u32::MAX }
+        let scrambling = Stream::new(job.run.seed, Domain::Scrambling, "");
+        let orders = 1..u32::MAX;
+        Realization { job, scene, sets, regions, orders_of_bins, fixed_direct, trajectories, scrambling, orders }
     }
 
     /// The same realization with only the vertices x_n, n in `orders`, connected: for tests order by order.
@@ -53,41 +65,96 @@ impl<'a> Realization<'a> {
 
     /// The scores of the batch number `index`.
     pub fn batch(&self, index: u64) -> BatchScores {
-        let (histories, flux) = self.trace(index);
-        let sets = self.sets.par_iter().zip(&self.orders_of_bins);
-        let scores = sets.map(|(set, order)| self.score(set, order, index, &histories)).collect();
-        BatchScores { sets: scores, flux: flux.scores(1.0 / self.job.run.histories_per_batch as f64) }
+        let (mut sets, flux) = match self.job.transport.estimator {
+            Estimator::Local => self.local(index),
+            // No trajectory leaves a source.
+            Estimator::Reverse => (self.reverse(index), FluxBalance::default()),
+            Estimator::DirectSimulation => self.direct_simulation(index),
+        };
+        sets.extend(self.regions.scores(&sets));
+        BatchScores { sets, flux: flux.scores(1.0 / self.job.run.histories_per_batch as f64) }
     }
 
-    /// Traces the histories of a batch and prepares their vertices.
-    fn trace(&self, index: u64) -> (Connectors, FluxBalance) {
-        let count = self.job.run.histories_per_batch;
-        let first = index * count;
-        let starts: Vec<u64> = (0..count).step_by(HISTORIES_AT_ONCE as usize).collect();
-        let traced: Vec<_> = starts
-            .into_par_iter()
-            .map(|start| self.trace_some(first + start..first + (start + HISTORIES_AT_ONCE).min(count)))
-            .collect();
+    /// Scores by connections from trajectories to receivers.
+    fn local(&self, index: u64) -> (Vec<Scores>, FluxBalance) {
+        let (histories, flux) = self.connectors(index);
+        let sets = self.sets.par_iter().zip(&self.orders_of_bins);
+        (sets.map(|(set, order)| self.score(set, order, index, &histories)).collect(), flux)
+    }
+
+    /// Scores by paths from the receivers.
+    fn reverse(&self, index: u64) -> Vec<Scores> {
+        let of_set = |set: &ReceiverSet| {
+            let stream = Stream::new(self.job.run.seed, Domain::Reverse, &set.shape().name);
+            let bins = (0..set.shape().bins() as u32).into_par_iter();
+            let paths = bins.map(|bin| set.reverse(self.scene, &self.job.transport, &stream, bin, index)).collect();
+            set.reverse_scores(paths)
+        };
+        self.sets.par_iter().map(of_set).collect()
+    }
+
+    /// Scores by counting trajectories on the cells of the grids, the only receivers of such a job.
+    fn direct_simulation(&self, index: u64) -> (Vec<Scores>, FluxBalance) {
+        let traced = self.trace::<Vec<Segment>>(index);
+        let mut flux = FluxBalance::default();
+        traced.iter().for_each(|(_, balance)| flux.add(balance));
+        let sets = self.sets.par_iter().zip(&self.job.grids);
+        let count = |(set, grid): (&ReceiverSet, _)| set.counted(self.scene, grid, traced.iter().map(|(s, _)| s));
+        (sets.map(count).collect(), flux)
+    }
+
+    /// The histories of a batch as connectors.
+    fn connectors(&self, index: u64) -> (Connectors, FluxBalance) {
         let mut connectors = Connectors::default();
         let mut flux = FluxBalance::default();
-        for (vertices, balance) in traced.iter().flatten() {
+        for (vertices, balance) in &self.trace::<Vec<Vertex>>(index) {
             connectors.push(self.scene, vertices);
             flux.add(balance);
         }
         (connectors, flux)
     }
 
-    fn trace_some(&self, histories: Range<u64>) -> Vec<(Vec<Vertex>, FluxBalance)> {
-        let trace = |history| {
-            let mut vertices = Vec::new();
-            let mut rng = self.trajectories.generator(history);
-            let flux = trace(self.scene, &self.job.transport, &mut rng, &mut vertices);
-            (vertices, flux)
+    /// The quasi-random set of a batch, where the job asks for one.
+    fn points(&self, batch: u64) -> Option<PointSet> {
+        let count = self.job.run.histories_per_batch;
+        let set = || {
+            assert!(count.is_power_of_two(), "the job was checked: {count} histories");
+            PointSet::new(&self.scrambling, batch, count.ilog2())
         };
-        histories.map(trace).collect()
+        (self.job.run.sampling == Sampling::Rqmc).then(set)
     }
 
-    /// The scores of one receiver set.
+    /// Traces the histories of a batch; their records in the order of their index.
+    fn trace<R: Record + Default + Send>(&self, index: u64) -> Vec<(R, FluxBalance)> {
+        let count = self.job.run.histories_per_batch;
+        let points = self.points(index);
+        let starts: Vec<u64> = (0..count).step_by(HISTORIES_AT_ONCE as usize).collect();
+        let some = |start| self.trace_some(index, start..(start + HISTORIES_AT_ONCE).min(count), points.as_ref());
+        let traced: Vec<Vec<_>> = starts.into_par_iter().map(some).collect();
+        traced.into_iter().flatten().collect()
+    }
+
+    /// Traces the histories `range` of a batch; history i starts with point i of `points`.
+    fn trace_some<R: Record + Default>(
+        &self,
+        batch: u64,
+        range: Range<u64>,
+        points: Option<&PointSet>,
+    ) -> Vec<(R, FluxBalance)> {
+        let first = batch * self.job.run.histories_per_batch;
+        let trace = |i: u64| {
+            let mut record = R::default();
+            let mut rng = self.trajectories.generator(first + i);
+            if let Some(points) = points {
+                rng = rng.after(points.point(i as u32));
+            }
+            let flux = trace(self.scene, &self.job.transport, &mut rng, &mut record);
+            (record, flux)
+        };
+        range.map(trace).collect()
+    }
+
+    /// The scores of one receiver set by connections.
     fn score(&self, set: &ReceiverSet, order: &[u32], batch: u64, histories: &Connectors) -> Scores {
         let channels = if self.job.run.channels == Channels::Rgb { 3 } else { 1 };
         let rule = (channels, &self.orders);
@@ -101,6 +168,11 @@ impl<'a> Realization<'a> {
     }
 }
 
+/// The surface seen in the centre of each pixel.
+fn centres(sight: &CentreSight) -> Vec<Option<u32>> {
+    (0..sight.pixels()).into_par_iter().map(|pixel| sight.primitive(pixel)).collect()
+}
+
 /// The bins of `set` in the order in which they share tiles.
 fn order_of_bins(set: &ReceiverSet, scene: &Scene) -> Vec<u32> {
     let centers: Vec<_> = (0..set.shape().bins()).into_par_iter().map(|i| set.center(scene, i)).collect();
@@ -108,7 +180,11 @@ fn order_of_bins(set: &ReceiverSet, scene: &Scene) -> Vec<u32> {
 }
 
 /// Direct light of the bins of `set` that is the same in every batch; empty for zero everywhere.
-fn fixed_direct(set: &ReceiverSet, scene: &Scene) -> Vec<f64> {
+fn fixed_direct(set: &ReceiverSet, scene: &Scene, estimator: Estimator) -> Vec<f64> {
     let bins = if set.has_no_fixed_direct() { 0 } else { set.shape().bins() };
-    (0..bins).into_par_iter().map(|i| set.fixed_direct(scene, i)).collect()
+    let of = |i| match estimator {
+        Estimator::Local | Estimator::Reverse => set.fixed_direct(scene, i),
+        Estimator::DirectSimulation => set.counted_beforehand(i),
+    };
+    (0..bins).into_par_iter().map(of).collect()
 }

@@ -2,6 +2,9 @@
 //!
 //! Only headers are read, so asking is cheap and never disturbs a worker. The relative error is an estimate: each
 //! shard looks at its own batches, and their median is scaled to all batches done.
+//!
+//! Headers say which looks of a run with a goal have come, not what was seen there: that is for the one who asks
+//! to find out and to fill in ([`Status::judge`]).
 
 use super::checkpoint::{Header, read_header};
 use super::folder::Folder;
@@ -53,12 +56,37 @@ pub struct Status {
     pub eta_seconds: Option<f64>,
     /// Median relative error so far, an estimate; None when nothing is known.
     pub relative_error_estimate: Option<f64>,
+    /// Where the goal stands; None without one.
+    pub goal: Option<GoalStatus>,
     /// Time spent by all workers \[s\].
     pub seconds: f64,
     /// Every shard with a checkpoint.
     pub shards: Vec<ShardStatus>,
     /// Checkpoints that were refused, by name, and why.
     pub refused: Vec<String>,
+}
+
+/// How far a run with a goal is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct GoalStatus {
+    /// The last look before which every batch is done; None before the first.
+    pub last_look: Option<u64>,
+    /// The look after that; None when the limit comes first.
+    pub next_look: Option<u64>,
+    /// What is known of the looks so far.
+    pub verdict: Verdict,
+}
+
+/// What is known of the looks of a run so far.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Nobody has looked: it would take reading tallies.
+    Open,
+    /// The goal was reached at no look so far.
+    NotReached,
+    /// The goal was reached after this number of batches: the run is done.
+    ReachedAt(u64),
 }
 
 /// The progress of the plan in `folder`.
@@ -129,9 +157,46 @@ impl Status {
             rate_of_a_worker: rate,
             eta_seconds: eta,
             relative_error_estimate: relative_error(&shards, batches),
+            goal: GoalStatus::new(plan, &shards),
             seconds,
             shards,
             refused,
+        }
+    }
+
+    /// Fills in what was seen at the looks so far: at which one the goal was reached, if at any.
+    pub fn judge(&mut self, reached: Option<u64>) {
+        let Some(goal) = &mut self.goal else { return };
+        goal.verdict = reached.map_or(Verdict::NotReached, Verdict::ReachedAt);
+        if reached.is_some() {
+            // Whatever shards are unfinished, nobody is to finish them.
+            (self.shards_active, self.eta_seconds) = (0, None);
+        }
+    }
+}
+
+impl GoalStatus {
+    /// From the progress of the shards of `plan`, in shard order; None without a goal.
+    fn new(plan: &Plan, shards: &[ShardStatus]) -> Option<Self> {
+        plan.job.stop.as_ref()?;
+        let last_look = plan.last_look(shards.iter().map(|s| (s.shard, s.batches)));
+        let next_look = plan.looks().into_iter().find(|&look| Some(look) > last_look);
+        let verdict = if last_look.is_some() { Verdict::Open } else { Verdict::NotReached };
+        Some(GoalStatus { last_look, next_look, verdict })
+    }
+}
+
+impl std::fmt::Display for GoalStatus {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        match (self.verdict, self.last_look) {
+            (Verdict::ReachedAt(batches), _) => return write!(f, "goal reached at {batches} batches: done"),
+            (Verdict::Open, Some(look)) => write!(f, "look at {look} batches: `lampyris merge` says what it shows, ")?,
+            (Verdict::NotReached, Some(look)) => write!(f, "goal not reached at {look} batches, ")?,
+            (_, None) => {}
+        }
+        match self.next_look {
+            Some(look) => write!(f, "next look at {look} batches"),
+            None => write!(f, "no look left before the limit"),
         }
     }
 }
@@ -157,10 +222,17 @@ impl std::fmt::Display for Status {
             writeln!(f, "{rate:.3} batches/s per worker, {} at work, {:.1} s spent", self.shards_active, self.seconds)?;
         }
         if let Some(eta) = self.eta_seconds {
-            writeln!(f, "about {eta:.0} s left")?;
+            let about = if self.goal.is_some() { "at most about" } else { "about" };
+            writeln!(f, "{about} {eta:.0} s left")?;
         }
         if let Some(error) = self.relative_error_estimate {
             writeln!(f, "median relative error so far: {:.3} % (an estimate)", 100.0 * error)?;
+        }
+        if let Some(goal) = &self.goal {
+            writeln!(f, "{goal}")?;
+        }
+        if self.goal.is_some_and(|goal| matches!(goal.verdict, Verdict::ReachedAt(_))) {
+            return self.refused.iter().try_for_each(|line| writeln!(f, "{line}"));
         }
         for s in self.shards.iter().filter(|s| s.batches < s.of) {
             writeln!(

@@ -12,6 +12,7 @@ use crate::tally::{BatchScores, Scores, Tally};
 pub const JOB: &str = r#"
 [run]
 seed = 7
+sampling = "random"
 batches = 10
 batches_per_shard = 4
 channels = "rgb"
@@ -74,6 +75,7 @@ pub fn scores(plan: &Plan, index: u64) -> BatchScores {
             s.existed[i] = g.uniform() < 0.9;
         }
         s.colour.iter_mut().for_each(|c| *c = [g.uniform(), g.uniform(), g.uniform()]);
+        s.watched.iter_mut().for_each(|w| w.totals = (0..64).map(|_| (g.uniform() - 0.5).max(0.0)).collect());
         sets.push(s);
     }
     BatchScores { sets, flux: [1.0, 0.75, 0.25, 0.0, index as f64] }

@@ -10,7 +10,8 @@ use super::inputs;
 use super::plan::Plan;
 use super::realization::Realization;
 use crate::error::{Error, Result};
-use crate::tally::{SetTally, Tally, statistics::median};
+use crate::tally::statistics::{Estimate, median};
+use crate::tally::{SetTally, Tally};
 use nix::sys::prctl;
 use nix::sys::signal::Signal;
 use nix::unistd::{Pid, getppid};
@@ -221,7 +222,7 @@ fn relative_error(tally: &Tally, fixed_direct: &[Vec<f64>]) -> f64 {
                 SetTally::Moments(m) => m.bins.estimate(bin, m.n),
                 SetTally::Replicates(r) => r.estimate(bin),
             };
-            estimate.shifted(fixed.get(bin).copied().unwrap_or(0.0)).relative_error()
+            estimate.with_fixed(fixed, bin).map_or(f64::NAN, Estimate::relative_error)
         };
         median((0..bins).step_by(bins.div_ceil(SAMPLED_BINS).max(1)).map(error))
     };

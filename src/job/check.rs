@@ -1,6 +1,6 @@
 //! Every check on what a user typed: each refusal names the field, the value and what is allowed.
 
-use super::{Camera, Estimator, Gonio, Grid, Job, Kept, Ratio, ReceiverKind, Region, Roulette, Source, Stop};
+use super::{Camera, Estimator, Gonio, Grid, Job, Kept, Ratio, ReceiverKind, Region, Roulette, Sampling, Source, Stop};
 use crate::error::{Error, Result};
 use std::collections::HashSet;
 use std::fmt::Debug;
@@ -9,6 +9,8 @@ use std::fmt::Debug;
 const MAX_BINS: u64 = 1 << 28;
 /// Largest coordinate \[m\]: beyond it positions in f32 say little.
 const MAX_METRES: f64 = 1e6;
+/// Fewest batches of quasi-random sets: only batches tell the error, and fewer tell it badly.
+const MIN_RQMC_BATCHES: u64 = 16;
 /// Most bins of one set that are watched history by history.
 const MAX_MONITORED: usize = 1024;
 
@@ -16,6 +18,7 @@ const MAX_MONITORED: usize = 1024;
 pub(super) fn check(job: &Job, file: &str) -> Result<()> {
     let c = Checker { file };
     check_run(&c, job)?;
+    check_sampling(&c, job)?;
     check_names(&c, job)?;
     for (i, camera) in job.cameras.iter().enumerate() {
         check_camera(&c, &format!("camera[{i}]"), camera, job.scene.is_some())?;
@@ -33,9 +36,7 @@ pub(super) fn check(job: &Job, file: &str) -> Result<()> {
     for (i, region) in job.regions.iter().enumerate() {
         check_region(&c, &format!("region[{i}]"), region, job)?;
     }
-    for (i, ratio) in job.ratios.iter().enumerate() {
-        check_ratio(&c, &format!("ratio[{i}]"), ratio, job)?;
-    }
+    check_ratios(&c, job)?;
     if let Some(stop) = &job.stop {
         check_stop(&c, stop, job)?;
     }
@@ -51,7 +52,31 @@ fn check_estimator(c: &Checker, job: &Job) -> Result<()> {
     let others = job.sets().into_iter().find(|s| s.kind != ReceiverKind::Grid);
     let allowed = "local or reverse: direct_simulation counts on the cells of grids, and knows no other receivers";
     let name = others.as_ref().map_or("", |s| s.name.as_str());
-    c.that("transport.estimator", format!("direct_simulation (with \"{name}\")"), others.is_none(), allowed)
+    c.that("transport.estimator", format!("direct_simulation (with \"{name}\")"), others.is_none(), allowed)?;
+    for (i, grid) in job.grids.iter().enumerate() {
+        check_cells(c, &format!("grid[{i}].normal"), grid)?;
+    }
+    Ok(())
+}
+
+/// What crosses a cell is the illuminance of its own plane, whichever way a lux-meter there would face.
+fn check_cells(c: &Checker, field: &str, grid: &Grid) -> Result<()> {
+    let across = cross(grid.u, grid.v);
+    let size = length(across);
+    let off = length(cross(across, grid.normal)) / (size * length(grid.normal));
+    let allowed = "with direct_simulation a normal across u and v, and u and v that span cells";
+    c.that(field, Shown(grid.normal), size > 1e-12 * length(grid.u) * length(grid.v) && off <= 1e-6, allowed)
+}
+
+/// With a goal the number of batches is its limit. A plan, in which the limit has been filled in, is read again.
+pub(super) fn check_typed_batches(typed: Option<u64>, stop: &Stop, file: &str) -> Result<()> {
+    match typed {
+        Some(batches) if batches != stop.max_batches => {
+            let allowed = format!("absent with [stop], whose max_batches = {} is the limit", stop.max_batches);
+            Err(Error::input(file, "run.batches", batches, allowed))
+        }
+        _ => Ok(()),
+    }
 }
 
 fn check_stop(c: &Checker, stop: &Stop, job: &Job) -> Result<()> {
@@ -86,6 +111,18 @@ fn check_region(c: &Checker, at: &str, region: &Region, job: &Job) -> Result<()>
         (None, Some(node)) => c.that(&format!("{at}.node"), node, job.scene.is_some(), "a node only with a scene"),
         _ => Err(Error::input(c.file, at, "(both or neither)", "either rectangle or node")),
     }
+}
+
+fn check_ratios(c: &Checker, job: &Job) -> Result<()> {
+    let mut seen = HashSet::new();
+    for (i, ratio) in job.ratios.iter().enumerate() {
+        let (at, name) = (format!("ratio[{i}]"), ratio.name.as_str());
+        c.name(&format!("{at}.name"), name)?;
+        let new = seen.insert(name.to_ascii_lowercase());
+        c.that(&format!("{at}.name"), name, new, "a name used for only one ratio")?;
+        check_ratio(c, &at, ratio, job)?;
+    }
+    Ok(())
 }
 
 fn check_ratio(c: &Checker, at: &str, ratio: &Ratio, job: &Job) -> Result<()> {
@@ -125,18 +162,31 @@ fn check_run(c: &Checker, job: &Job) -> Result<()> {
     Ok(())
 }
 
+/// A scrambled set has 2^m points; with `[stop]` the number of batches is not `run.batches`, and has its own limits.
+fn check_sampling(c: &Checker, job: &Job) -> Result<()> {
+    let run = &job.run;
+    if run.sampling == Sampling::Random {
+        return Ok(());
+    }
+    let n = run.histories_per_batch;
+    let (below, above) = (1u64 << n.ilog2(), n.next_power_of_two());
+    let allowed = format!("a power of two: {below} or {above}; any number with sampling = \"random\"");
+    c.that("run.histories_per_batch", n, n.is_power_of_two(), &allowed)?;
+    let enough = job.stop.is_some() || run.batches >= MIN_RQMC_BATCHES;
+    let allowed = format!("at least {MIN_RQMC_BATCHES}; any number with sampling = \"random\"");
+    c.that("run.batches", run.batches, enough, &allowed)
+}
+
 fn check_names(c: &Checker, job: &Job) -> Result<()> {
     let mut seen = HashSet::new();
     let sets = job.sets();
     c.that("receivers", sets.len(), !sets.is_empty(), "at least one [[camera]], [[grid]], [[point]] or [[gonio]]")?;
     for set in &sets {
         let name = set.name.as_str();
-        let plain = |b: u8| b.is_ascii_alphanumeric() || b == b'_' || b == b'-';
-        let fits = (1..=64).contains(&name.len()) && name.bytes().all(plain);
-        c.that("name", name, fits, "1 .. 64 letters, digits, '_' or '-'")?;
-        // Results are files named after their sets; `points.csv` and `summary.json` are already taken.
-        let free = !["points", "summary", "flux"].contains(&name);
-        c.that("name", name, free, "any name but points, summary and flux")?;
+        c.name("name", name)?;
+        // Results are files named after their sets; `points.csv`, `regions.csv` and `summary.json` are already taken.
+        let free = !["points", "regions", "summary", "flux"].contains(&name);
+        c.that("name", name, free, "any name but points, regions, summary and flux")?;
         c.that("name", name, seen.insert(name.to_ascii_lowercase()), "a name used only once")?;
     }
     Ok(())
@@ -225,6 +275,12 @@ struct Checker<'a> {
 impl Checker<'_> {
     fn that(&self, field: &str, value: impl ToString, holds: bool, allowed: &str) -> Result<()> {
         if holds { Ok(()) } else { Err(Error::input(self.file, field, value, allowed)) }
+    }
+
+    fn name(&self, field: &str, name: &str) -> Result<()> {
+        let plain = |b: u8| b.is_ascii_alphanumeric() || b == b'_' || b == b'-';
+        let fits = (1..=64).contains(&name.len()) && name.bytes().all(plain);
+        self.that(field, name, fits, "1 .. 64 letters, digits, '_' or '-'")
     }
 
     fn range(&self, field: &str, value: u64, low: u64, high: u64) -> Result<()> {

@@ -57,15 +57,22 @@ pub struct Job {
     pub sources: Vec<Source>,
 }
 
+/// Default histories of a batch in a job with maps.
+const HISTORIES_OF_MAPS: u64 = 16;
+/// The same in a job of lux-meters alone.
+const HISTORIES_OF_METERS: u64 = 1024;
+
 /// `[run]`: seed, division of work and confidence.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Run {
     /// Seed of every random number, 0 ..= 2^63-1.
     pub seed: u64,
-    /// Histories of one batch; a batch is one realization, the unit of the variance.
+    /// Histories of one batch; a batch is one realization, the unit of the variance. Left out: 16 with cameras or
+    /// goniometers, whose pixels need many positions, and so many batches; else 1024, because a quasi-random set gains
+    /// with its size (docs/benchmarks.md).
     pub histories_per_batch: u64,
-    /// Number of batches of the whole job.
+    /// Number of batches of the whole job; with `[stop]` its `max_batches`, and not to be typed.
     pub batches: u64,
     /// Shard k holds the batches [k n, k n + n).
     pub batches_per_shard: u64,
@@ -83,10 +90,10 @@ impl Default for Run {
     fn default() -> Self {
         Run {
             seed: 1,
-            histories_per_batch: 64,
+            histories_per_batch: HISTORIES_OF_METERS,
             batches: 256,
             batches_per_shard: 32,
-            sampling: Sampling::Random,
+            sampling: Sampling::Rqmc,
             confidence: 0.95,
             channels: Channels::Luminance,
             checkpoint_seconds: 30.0,
@@ -258,12 +265,30 @@ impl Job {
     /// [`Error::Input`] naming the field, its value and the allowed range.
     pub fn parse(text: &str, file: &str) -> Result<Job> {
         let toml = toml::Deserializer::parse(text).map_err(|e| syntax_error(file, text, "(syntax)", &e))?;
-        let job: Job = serde_path_to_error::deserialize(toml).map_err(|e| {
+        let mut job: Job = serde_path_to_error::deserialize(toml).map_err(|e| {
             let field = e.path().to_string();
             syntax_error(file, text, &field, e.inner())
         })?;
+        let typed = Typed::of(text);
+        if let Some(stop) = &job.stop {
+            check::check_typed_batches(typed.batches, stop, file)?;
+            job.run.batches = stop.max_batches;
+        }
+        if typed.histories_per_batch.is_none() && job.has_maps() {
+            job.run.histories_per_batch = HISTORIES_OF_MAPS;
+        }
         check::check(&job, file)?;
         Ok(job)
+    }
+
+    /// The field that says how many batches the job has at most.
+    pub fn batches_field(&self) -> &'static str {
+        if self.stop.is_some() { "stop.max_batches" } else { "run.batches" }
+    }
+
+    /// True with cameras or goniometers among the receivers.
+    fn has_maps(&self) -> bool {
+        !(self.cameras.is_empty() && self.gonios.is_empty())
     }
 
     /// All receiver sets in the order of the tallies: cameras, gonios, grids, points, regions.
@@ -274,6 +299,23 @@ impl Job {
         let points = self.points.iter().map(|p| p.shape());
         let regions = self.regions.iter().map(|r| r.shape());
         cameras.chain(gonios).chain(grids).chain(points).chain(regions).collect()
+    }
+}
+
+/// What stands in `[run]` of the job file: a default is not what somebody typed.
+#[derive(Default, Deserialize)]
+struct Typed {
+    batches: Option<u64>,
+    histories_per_batch: Option<u64>,
+}
+
+impl Typed {
+    fn of(text: &str) -> Self {
+        #[derive(Deserialize)]
+        struct File {
+            run: Option<Typed>,
+        }
+        toml::from_str::<File>(text).ok().and_then(|file| file.run).unwrap_or_default()
     }
 }
 

@@ -1,9 +1,12 @@
 //! Illuminance as tables: one row for each grid point or lux-meter, every number with all its digits.
 
-use super::values::{Bin, FEW_BATCHES, SetValues, Status};
+use super::derived::{family_interval, quantile_of};
+use super::health::is_plain;
+use super::values::{Bin, SetValues};
 use crate::farm::merge::Merged;
 use crate::farm::plan::Plan;
 use crate::math::DVec3;
+use crate::tally::health::Mark;
 use std::io::{Result, Write};
 
 const HEADER: [&str; 16] = [
@@ -25,15 +28,26 @@ const HEADER: [&str; 16] = [
     "note",
 ];
 
+/// Of grids alone, before `vov`: ends of intervals that hold for every point of the grid together.
+const FAMILY: [&str; 2] = ["family_lower_lx", "family_upper_lx"];
+
+/// Place of `FAMILY` in a row: before the last two columns.
+const FAMILY_AT: usize = HEADER.len() - 2;
+
 /// Writes the grid `values`, row-major, column fastest.
 pub(super) fn write_grid(plan: &Plan, merged: &Merged, values: &SetValues, to: &mut impl Write) -> Result<()> {
     let grid = plan.job.grids.iter().find(|g| g.name == values.shape.name).expect("a set comes from its job");
     let mut table = ::csv::Writer::from_writer(to);
-    table.write_record(HEADER)?;
+    let mut header = HEADER.to_vec();
+    header.splice(FAMILY_AT..FAMILY_AT, FAMILY);
+    table.write_record(header)?;
+    let quantile = quantile_of(values, plan.job.run.confidence, merged.batches);
     let columns = values.shape.width as usize;
     for (index, bin) in values.bins.iter().enumerate() {
         let place = [index, index % columns, index / columns];
-        table.write_record(row(place, grid.position(index), grid.normal, bin, &note(bin, merged)))?;
+        let mut row = row(place, grid.position(index), grid.normal, bin, &note(bin, plan, merged));
+        row.splice(FAMILY_AT..FAMILY_AT, family_interval(bin, quantile).map(|x| format!("{x:?}")));
+        table.write_record(row)?;
     }
     table.flush()
 }
@@ -45,7 +59,7 @@ pub(super) fn write_points(plan: &Plan, merged: &Merged, points: &[SetValues], t
     for (index, (values, point)) in points.iter().zip(&plan.job.points).enumerate() {
         assert_eq!(values.shape.name, point.name, "points come in job order");
         let bin = &values.bins[0];
-        let row = row([index, 0, 0], point.position, point.normal, bin, &note(bin, merged));
+        let row = row([index, 0, 0], point.position, point.normal, bin, &note(bin, plan, merged));
         table.write_record([point.name.clone()].iter().chain(&row))?;
     }
     table.flush()
@@ -60,15 +74,9 @@ fn row(place: [usize; 3], position: [f64; 3], normal: [f64; 3], bin: &Bin, note:
 }
 
 /// What a reader must know before using the numbers of `bin`.
-fn note(bin: &Bin, merged: &Merged) -> String {
-    if bin.status == Status::NoReceiver {
-        return "inside".to_owned();
-    }
-    let notes = [
-        (bin.status == Status::NoInformation, "no information"),
-        (merged.batches < FEW_BATCHES, "few batches"),
-        (!merged.missing.is_empty(), "incomplete"),
-    ];
-    let due: Vec<&str> = notes.iter().filter(|(holds, _)| *holds).map(|&(_, text)| text).collect();
-    due.join("; ")
+pub(super) fn note(bin: &Bin, plan: &Plan, merged: &Merged) -> String {
+    let Some(health) = bin.health else { return "inside".to_owned() };
+    let others = [(is_plain(plan), "plain"), (!merged.missing.is_empty(), "incomplete")];
+    let others = others.iter().filter(|(holds, _)| *holds).map(|&(_, text)| text);
+    health.marks().map(Mark::word).chain(others).collect::<Vec<_>>().join("; ")
 }

@@ -4,6 +4,7 @@
 //! the header: units, confidence, batches, histories, seed, digests, version. Counts are texts, because an integer
 //! attribute has 32 bits.
 
+use super::health::estimate_label;
 use super::missing_text;
 use super::values::{Bin, SetValues, unit};
 use crate::farm::merge::Merged;
@@ -18,7 +19,7 @@ use std::io::{Result, Seek, Write};
 /// Name of a channel and where its numbers come from.
 type Channel = (&'static str, fn(&Bin) -> f64);
 
-const CHANNELS: [Channel; 10] = [
+const CHANNELS: [Channel; 11] = [
     ("R", |b| b.colour[0]),
     ("G", |b| b.colour[1]),
     ("B", |b| b.colour[2]),
@@ -28,6 +29,7 @@ const CHANNELS: [Channel; 10] = [
     ("luminance.ciLower", |b| b.low),
     ("luminance.ciUpper", |b| b.high),
     ("luminance.peak", |b| b.peak),
+    ("luminance.health", Bin::health_code),
     ("direct.Y", |b| b.direct),
 ];
 
@@ -58,6 +60,7 @@ fn attributes(plan: &Plan, merged: &Merged, values: &SetValues) -> LayerAttribut
     let inputs: Vec<String> = plan.inputs.iter().map(|i| format!("{} {}", i.digest, i.name)).collect();
     let texts = [
         ("units", unit(values.shape.kind).to_owned()),
+        ("estimate", estimate_label(plan).to_owned()),
         ("batches", merged.batches.to_string()),
         ("historiesPerBatch", run.histories_per_batch.to_string()),
         ("histories", (merged.batches * run.histories_per_batch).to_string()),

@@ -5,8 +5,10 @@
 //! | `<camera>.exr`, `<gonio>.exr` | luminance map: `R,G,B`, `luminance.*`, `direct.Y`, see below |
 //! | `<grid>.csv` | illuminance, one row for each grid point, row-major |
 //! | `points.csv` | the same for all lux-meters `[[point]]`, with their names |
+//! | `regions.csv` | mean luminance of every `[[region]]` |
 //! | `<name>.png` | false-colour picture of a camera, goniometer or grid and of its relative error |
-//! | `summary.json` | one line of statistics for each receiver set, flux balance, timings, digest of all numbers |
+//! | `summary.json` | one line of statistics for each receiver set, what is derived from several bins, flux
+//!   balance, timings, what ended the run, digest of all numbers |
 //!
 //! Channels of an EXR file, 32-bit float, row 0 on top, \[cd/m2\] except where said:
 //!
@@ -18,17 +20,26 @@
 //! | `luminance.standardError` | of that mean |
 //! | `luminance.ciLower`, `luminance.ciUpper` | Student's interval at the confidence of the job, not clamped at 0 |
 //! | `luminance.peak` | largest single history over the sum of all \[1\], direct light left out |
+//! | `luminance.health` | 0, or why the interval should not be trusted: a sum of codes \[1\] |
 //! | `direct.Y` | the part of `luminance.Y` that is emitted or reflected once (L0 + K L0) |
 //!
-//! NaN stands wherever nothing is known: no receiver, no batch, no score. The report turns counted numbers into
+//! Codes of the health: 1 no information, 2 few batches, 4 relative error, 8 peak, 16 vov (not in maps), 32 tail, 64
+//! checks; `tally::health` says when each is set. The note of a table has the same words.
+//!
+//! NaN stands wherever nothing is known: no receiver, no batch, no history that reached it. The report turns counted numbers into
 //! files; how they were produced it does not know, and it never recomputes them.
 
 mod canvas;
 mod csv;
+mod derived;
+mod derived_text;
 mod exr;
+mod health;
 mod number;
 mod png;
+mod regions;
 mod scale;
+mod stopping;
 mod summary;
 mod text;
 mod values;
@@ -53,23 +64,26 @@ use values::SetValues;
 pub fn write(plan: &Plan, merged: &Merged, dir: &Path) -> Result<()> {
     std::fs::create_dir_all(dir).map_err(Error::io(dir))?;
     let mut collector = Collector::new(plan, merged);
-    let mut points = Vec::new();
+    let (mut points, mut regions) = (Vec::new(), Vec::new());
     for values in SetValues::all(plan, merged) {
         collector.add(&values);
-        if values.shape.kind == ReceiverKind::Point {
-            points.push(values);
-        } else {
-            write_set(plan, merged, &values, dir)?;
+        match values.shape.kind {
+            ReceiverKind::Point => points.push(values),
+            ReceiverKind::Region => regions.push(values),
+            ReceiverKind::Camera | ReceiverKind::Gonio | ReceiverKind::Grid => write_set(plan, merged, &values, dir)?,
         }
     }
     if !points.is_empty() {
         replace(&dir.join("points.csv"), |to| csv::write_points(plan, merged, &points, to))?;
     }
+    if !regions.is_empty() {
+        replace(&dir.join("regions.csv"), |to| regions::write(plan, merged, &regions, to))?;
+    }
     let summary = collector.finish();
     replace(&dir.join("summary.json"), |to| summary::write_json(&summary, to))
 }
 
-/// The files of one receiver set that is not a point.
+/// The files of one receiver set that is neither point nor region.
 fn write_set(plan: &Plan, merged: &Merged, values: &SetValues, dir: &Path) -> Result<()> {
     let name = &values.shape.name;
     if values.shape.kind == ReceiverKind::Grid {

@@ -7,10 +7,11 @@ use super::canvas::{Canvas, Font, Rgb};
 use super::missing_text;
 use super::number::{label, short};
 use super::scale::{NOTHING, Scale};
-use super::values::{Bin, FEW_BATCHES, SetValues, kind_name};
+use super::values::{Bin, SetValues, kind_name};
 use crate::farm::merge::Merged;
 use crate::farm::plan::Plan;
 use crate::job::ReceiverKind;
+use crate::tally::health::FEW_BATCHES;
 use std::io::{Result, Write};
 
 /// Upper left pixel of the first map in every picture.
@@ -251,7 +252,7 @@ mod tests {
         let kept = Kept::Moments { colour: false };
         let shape_of_set =
             SetShape { name: "x".into(), kind: ReceiverKind::Grid, width, height, kept, monitored: Vec::new() };
-        let values = SetValues { shape: shape_of_set, bins: Vec::new() };
+        let values = SetValues { shape: shape_of_set, bins: Vec::new(), monitored: Vec::new() };
         let zoom = Zoom::new(&values, shape);
         (zoom.cell, zoom.size(&values), zoom.step)
     }

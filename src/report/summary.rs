@@ -1,12 +1,17 @@
 //! `summary.json`: what a whole receiver set says in a line, the flux balance, timings, and a digest by which two
 //! runs are compared. A number that is not finite is `null`.
 
-use super::values::{Bin, FEW_BATCHES, SetValues, Status, kind_name, unit};
+use super::derived::{OfRatio, OfSet, of_set, ratios};
+use super::health::{Monitored, count_marks, count_unhealthy, estimate_label, is_plain, lines};
+use super::stopping::StoppedBy;
+use super::values::{Bin, SetValues, Status, kind_name, unit};
 use crate::farm::merge::Merged;
 use crate::farm::plan::{Input, Plan};
 use crate::tally::FLUX_BINS;
+use crate::tally::health::FEW_BATCHES;
 use crate::tally::statistics::{Estimate, figure_of_merit, median, student_quantile};
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::io::{Result, Write};
 
 /// The content of `summary.json`.
@@ -23,11 +28,18 @@ pub(super) struct Summary {
     pub batches: u64,
     /// Half-open ranges of batches.
     pub missing_batches: Vec<[u64; 2]>,
+    /// What ended the run; `null` without a goal.
+    pub stopped_by: Option<StoppedBy>,
     pub histories_per_batch: u64,
     pub histories: u64,
     pub seed: u64,
     pub confidence: f64,
+    /// What kind of estimate the numbers are.
+    pub estimate: &'static str,
     pub sets: Vec<SetSummary>,
+    pub ratios: Vec<OfRatio>,
+    /// The bins whose single histories were watched.
+    pub monitored: Vec<Monitored>,
     pub flux_lm: Flux,
     pub timings: Timings,
     /// Of the scene, and of these results.
@@ -45,8 +57,12 @@ pub(super) struct SetSummary {
     pub bins: usize,
     /// Bins without receiver: inside a solid or behind a surface. They are in none of the statistics.
     pub inside: usize,
-    /// Bins whose receiver never scored.
+    /// Bins that no history reached.
     pub no_information: usize,
+    /// Bins whose interval should not be trusted.
+    pub unhealthy: usize,
+    /// How many have each mark.
+    pub marks: BTreeMap<String, usize>,
     /// Bins that are the same in every batch; they have no part in the statistics of errors.
     pub exact: usize,
     pub mean: f64,
@@ -56,6 +72,8 @@ pub(super) struct SetSummary {
     pub worst_relative_error: f64,
     /// 1 / (mean squared relative error x seconds of all workers) \[1/s\].
     pub figure_of_merit: f64,
+    #[serde(flatten)]
+    pub of_set: OfSet,
 }
 
 /// A number with its error.
@@ -95,24 +113,28 @@ pub(super) struct Collector<'a> {
     plan: &'a Plan,
     merged: &'a Merged,
     sets: Vec<SetSummary>,
+    monitored: Vec<Monitored>,
     hasher: blake3::Hasher,
 }
 
 impl<'a> Collector<'a> {
     /// Nothing gathered yet.
     pub fn new(plan: &'a Plan, merged: &'a Merged) -> Self {
-        Collector { plan, merged, sets: Vec::new(), hasher: blake3::Hasher::new() }
+        Collector { plan, merged, sets: Vec::new(), monitored: Vec::new(), hasher: blake3::Hasher::new() }
     }
 
     /// Takes in the next receiver set in job order.
     pub fn add(&mut self, values: &SetValues) {
-        self.sets.push(SetSummary::new(values, self.merged.seconds));
+        let derived = of_set(self.plan, self.merged, self.sets.len(), &values.shape);
+        self.sets.push(SetSummary::new(values, self.merged.seconds, derived));
+        self.monitored.extend(Monitored::all(values));
         let shape = &values.shape;
         self.hasher.update(shape.name.as_bytes());
         self.hasher.update(&shape.width.to_le_bytes()).update(&shape.height.to_le_bytes());
         for bin in &values.bins {
             self.hash(&bin.numbers());
         }
+        values.monitored.iter().for_each(|examined| self.hash(&examined.numbers()));
     }
 
     /// The summary of all.
@@ -133,12 +155,16 @@ impl<'a> Collector<'a> {
             complete: merged.missing.is_empty(),
             batches: merged.batches,
             missing_batches: merged.missing.iter().map(|r| [r.start, r.end]).collect(),
+            stopped_by: StoppedBy::new(plan, merged),
             histories_per_batch: run.histories_per_batch,
             histories,
             seed: run.seed,
             confidence: run.confidence,
-            warnings: warnings(plan, merged, &flux, &self.sets),
+            estimate: estimate_label(plan),
+            warnings: warnings(plan, merged, &flux, lines(&self.sets, &self.monitored)),
             sets: self.sets,
+            ratios: ratios(plan, merged),
+            monitored: self.monitored,
             flux_lm: flux,
             timings: Timings {
                 worker_seconds: merged.seconds,
@@ -158,7 +184,7 @@ impl<'a> Collector<'a> {
 }
 
 impl SetSummary {
-    fn new(values: &SetValues, seconds: f64) -> Self {
+    fn new(values: &SetValues, seconds: f64, of_set: OfSet) -> Self {
         let bins = &values.bins;
         let count = |status| bins.iter().filter(|b| b.status == status).count();
         let found = || bins.iter().map(|b| b.value).filter(|x| x.is_finite());
@@ -171,6 +197,8 @@ impl SetSummary {
             bins: bins.len(),
             inside: count(Status::NoReceiver),
             no_information: count(Status::NoInformation),
+            unhealthy: count_unhealthy(bins),
+            marks: count_marks(bins),
             exact: count(Status::Exact),
             mean: mean(found()),
             min: found().fold(f64::NAN, f64::min),
@@ -178,6 +206,7 @@ impl SetSummary {
             median_relative_error: median(errors()),
             worst_relative_error: errors().fold(f64::NAN, f64::max),
             figure_of_merit: figure_of_merit(mean(errors().map(|r| r * r)).sqrt(), seconds),
+            of_set,
         }
     }
 }
@@ -232,11 +261,15 @@ fn met_delta_meaning(share: f64) -> String {
     }
 }
 
-fn warnings(plan: &Plan, merged: &Merged, flux: &Flux, sets: &[SetSummary]) -> Vec<String> {
+fn warnings(plan: &Plan, merged: &Merged, flux: &Flux, health: Vec<String>) -> Vec<String> {
     let mut warnings = plan.scene.warnings.clone();
+    if is_plain(plan) {
+        warnings.push(estimate_label(plan).to_owned());
+    }
     if !merged.missing.is_empty() {
         warnings.push(format!("incomplete: batches {} are missing", super::missing_text(merged)));
     }
+    warnings.extend(StoppedBy::new(plan, merged).and_then(|by| by.warning(plan.job.run.confidence)));
     if merged.batches < FEW_BATCHES {
         warnings.push(format!("few batches: {} of the {FEW_BATCHES} that an interval needs", merged.batches));
     }
@@ -246,9 +279,7 @@ fn warnings(plan: &Plan, merged: &Merged, flux: &Flux, sets: &[SetSummary]) -> V
     if flux.met_delta_share > 0.0 {
         warnings.push(flux.met_delta_meaning.clone());
     }
-    for set in sets.iter().filter(|s| s.no_information > 0) {
-        warnings.push(format!("{}: {} of {} bins have no information", set.name, set.no_information, set.bins));
-    }
+    warnings.extend(health);
     warnings
 }
 

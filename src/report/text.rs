@@ -1,5 +1,6 @@
 //! The summary as a short table for a terminal.
 
+use super::derived_text;
 use super::number::short;
 use super::summary::{Collector, SetSummary, Summary, Term};
 use super::values::SetValues;
@@ -15,7 +16,9 @@ pub fn text_summary(plan: &Plan, merged: &Merged) -> String {
     SetValues::all(plan, merged).for_each(|values| collector.add(&values));
     let summary = collector.finish();
     let mut lines = vec![head(&summary)];
+    lines.extend(summary.stopped_by.as_ref().map(|by| by.line(summary.confidence)));
     lines.extend(table(&summary.sets));
+    lines.extend(derived_text::lines(&summary));
     lines.push(balance(&summary));
     lines.extend(summary.warnings.iter().map(|w| format!("warning: {w}")));
     lines.join("\n") + "\n"
@@ -30,7 +33,8 @@ fn head(summary: &Summary) -> String {
 fn table(sets: &[SetSummary]) -> Vec<String> {
     let head = ["set", "bins", "unit", "mean", "min", "max", "median error", "worst error"].map(str::to_owned);
     let points = sets.iter().filter(|s| s.kind == "point").count();
-    let shown = sets.iter().filter(|s| s.kind != "point" || points <= MOST_POINTS);
+    // A region has a line of its own, with its interval.
+    let shown = sets.iter().filter(|s| s.kind != "region" && (s.kind != "point" || points <= MOST_POINTS));
     let rows: Vec<[String; 8]> = std::iter::once(head).chain(shown.map(row)).collect();
     let width = |column: usize| rows.iter().map(|r| r[column].chars().count()).max().unwrap_or(0);
     let widths: [usize; 8] = std::array::from_fn(width);

@@ -1,17 +1,16 @@
 //! From a merged tally to the numbers that are written, once, for every file.
 //!
 //! A tally holds the random part only. Here the part known without error is added, Student's quantile for the
-//! number of batches is applied, and every bin gets its [`Status`]. Nothing else in the program does this.
+//! number of batches is applied, and every bin gets its [`Status`]. Goals are judged by the same estimates
+//! ([`Estimate::with_fixed`]).
 
+use super::health::Examined;
 use crate::farm::merge::{Merged, SetResult};
 use crate::farm::plan::Plan;
 use crate::job::{ReceiverKind, SetShape};
+use crate::tally::health::{Health, Signs, health};
 use crate::tally::statistics::{Estimate, student_quantile, variance_of_variance};
-use crate::tally::{MomentBlock, Replicates};
-
-/// Below this number of batches an interval is noted: Student's quantile is then more than 9 % wider than a normal
-/// one, and batch means of skewed scores cover less than they promise.
-pub(super) const FEW_BATCHES: u64 = 16;
+use crate::tally::{MomentBlock, Monitor, Replicates};
 
 /// What is known of a bin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,7 +19,7 @@ pub(super) enum Status {
     Estimated,
     /// The same in every batch: light seen without any reflection by a receiver.
     Exact,
-    /// The receiver existed and never scored (or there is no batch at all): the error is NaN, never 0.
+    /// The receiver existed and no history reached it (or there is no batch at all): the error is NaN, never 0.
     NoInformation,
     /// No receiver there: inside a solid, or behind a surface. Every number is NaN.
     NoReceiver,
@@ -47,6 +46,8 @@ pub(super) struct Bin {
     pub colour: [f64; 3],
     /// What is known.
     pub status: Status,
+    /// Why the interval should not be trusted; None without receiver.
+    pub health: Option<Health>,
 }
 
 impl Bin {
@@ -62,6 +63,7 @@ impl Bin {
             vov: nan,
             colour: [nan; 3],
             status,
+            health: None,
         }
     }
 
@@ -72,9 +74,15 @@ impl Bin {
     }
 
     /// All numbers in a fixed order, for a digest.
-    pub fn numbers(&self) -> [f64; 10] {
+    pub fn numbers(&self) -> [f64; 11] {
         let [r, g, b] = self.colour;
-        [self.value, self.standard_error, self.low, self.high, self.direct, self.peak, self.vov, r, g, b]
+        let health = self.health_code();
+        [self.value, self.standard_error, self.low, self.high, self.direct, self.peak, self.vov, r, g, b, health]
+    }
+
+    /// Sum of the codes of its marks; NaN without receiver.
+    pub fn health_code(&self) -> f64 {
+        self.health.map_or(f64::NAN, |h| f64::from(h.code()))
     }
 }
 
@@ -84,37 +92,48 @@ pub(super) struct SetValues {
     pub shape: SetShape,
     /// Row by row.
     pub bins: Vec<Bin>,
+    /// The monitored bins, in ascending order.
+    pub monitored: Vec<Examined>,
 }
 
 impl SetValues {
-    /// The numbers of the receiver set `shape` of which `set` is the result.
-    pub fn new(plan: &Plan, merged: &Merged, shape: &SetShape, set: &SetResult) -> Self {
+    /// The numbers of the receiver set `shape` of which `set` is the result and `monitors` are its monitored bins.
+    pub fn new(plan: &Plan, merged: &Merged, shape: &SetShape, set: &SetResult, monitors: &[Monitor]) -> Self {
         let batches = merged.batches;
         let run = &plan.job.run;
+        let (SetResult::Moments { fixed_direct, .. } | SetResult::Replicates { fixed_direct, .. }) = set;
+        let fixed = |bin: u32| fixed_direct.get(bin as usize).copied().unwrap_or(0.0);
+        let examine = |m: &Monitor| Examined::new(m, fixed(m.bin), run.sampling);
+        let monitored: Vec<Examined> = monitors.iter().map(examine).collect();
         let rule = Rule {
+            batches,
             quantile: student_quantile(run.confidence, batches),
             histories: batches as f64 * run.histories_per_batch as f64,
         };
         let bins = match set {
-            SetResult::Moments { bins, fixed_direct } => {
+            SetResult::Moments { bins, .. } => {
                 assert_eq!(bins.len(), shape.bins(), "the result of another set");
                 let raw = (0..bins.len()).map(|i| Raw::from_moments(bins, i, batches));
-                rule.apply(raw, fixed_direct)
+                rule.apply(raw, fixed_direct, &monitored)
             }
-            SetResult::Replicates { scores, fixed_direct } => {
+            SetResult::Replicates { scores, .. } => {
                 assert!(scores.has_shape(shape.bins(), batches), "the result of another set");
                 let raw = (0..shape.bins()).map(|i| Raw::from_replicates(scores, i));
-                rule.apply(raw, fixed_direct)
+                rule.apply(raw, fixed_direct, &monitored)
             }
         };
-        SetValues { shape: shape.clone(), bins }
+        SetValues { shape: shape.clone(), bins, monitored }
     }
 
     /// All receiver sets of `plan`, one at a time.
     pub fn all<'a>(plan: &'a Plan, merged: &'a Merged) -> impl Iterator<Item = SetValues> + 'a {
         let shapes = plan.job.sets();
-        assert_eq!(shapes.len(), merged.sets.len(), "a result for each receiver set");
-        shapes.into_iter().zip(&merged.sets).map(|(shape, set)| SetValues::new(plan, merged, &shape, set))
+        let lengths = [merged.sets.len(), merged.monitors.len()];
+        assert_eq!(lengths, [shapes.len(); 2], "a result for each receiver set");
+        let results = merged.sets.iter().zip(&merged.monitors);
+        let values =
+            |(shape, (set, monitors)): (SetShape, (_, &Vec<_>))| SetValues::new(plan, merged, &shape, set, monitors);
+        shapes.into_iter().zip(results).map(values)
     }
 }
 
@@ -161,7 +180,7 @@ impl Raw {
         Raw {
             estimate: scores.estimate(i),
             direct: scores.direct_mean(i),
-            peak: f64::NAN,
+            peak: scores.peak[i],
             vov: variance_of_variance(scores.scores(i)),
             colour: None,
         }
@@ -170,27 +189,33 @@ impl Raw {
 
 /// What is the same for all bins of a set.
 struct Rule {
+    batches: u64,
     quantile: f64,
     /// Histories of all batches.
     histories: f64,
 }
 
 impl Rule {
-    fn apply(&self, raw: impl Iterator<Item = Raw>, fixed_direct: &[f64]) -> Vec<Bin> {
-        let known = |(i, raw): (usize, Raw)| self.bin(&raw, fixed_direct.get(i).copied().unwrap_or(0.0));
+    fn apply(&self, raw: impl Iterator<Item = Raw>, fixed_direct: &[f64], monitored: &[Examined]) -> Vec<Bin> {
+        let known = |(i, raw): (usize, Raw)| {
+            let examined = monitored.binary_search_by_key(&i, |e| e.bin as usize).ok().map(|at| &monitored[at]);
+            let mut bin = self.bin(&raw, fixed_direct, i);
+            bin.health = (bin.status != Status::NoReceiver).then(|| self.health(&bin, examined));
+            bin
+        };
         let bins: Vec<Bin> = raw.enumerate().map(known).collect();
         assert!(fixed_direct.is_empty() || fixed_direct.len() == bins.len(), "direct light of another set");
         bins
     }
 
-    fn bin(&self, raw: &Raw, fixed: f64) -> Bin {
-        if fixed.is_nan() {
+    fn bin(&self, raw: &Raw, fixed_direct: &[f64], i: usize) -> Bin {
+        let Some(estimate) = raw.estimate.with_fixed(fixed_direct, i) else {
             return Bin::unknown(Status::NoReceiver);
-        }
-        if raw.estimate.n == 0 {
+        };
+        if estimate.n == 0 {
             return Bin::unknown(Status::NoInformation);
         }
-        let estimate = raw.estimate.shifted(fixed);
+        let fixed = fixed_direct.get(i).copied().unwrap_or(0.0);
         let (low, high) = estimate.interval(self.quantile);
         Bin {
             value: estimate.mean,
@@ -203,7 +228,21 @@ impl Rule {
             // Fixed light has no colour of its own in a tally: added as grey it keeps the luminance right.
             colour: raw.colour.map_or([estimate.mean; 3], |c| c.map(|x| x + fixed)),
             status: status(estimate),
+            health: None,
         }
+    }
+
+    /// The marks of an existing bin.
+    fn health(&self, bin: &Bin, examined: Option<&Examined>) -> Health {
+        health(&Signs {
+            batches: self.batches,
+            informed: bin.status != Status::NoInformation,
+            relative_error: bin.relative_error(),
+            peak: bin.peak,
+            vov: bin.vov,
+            slope: examined.and_then(|e| e.slope),
+            failed_checks: examined.map_or(0, Examined::failed_checks),
+        })
     }
 
     /// Share of the largest history in the sum of all; NaN where no history contributed.

@@ -5,9 +5,11 @@
 //! source in proportion to flux. A scene does not know receivers, seeds or files.
 
 pub mod gltf;
+mod nodes;
 mod reflectance;
 mod source;
 
+pub use nodes::{Node, Nodes};
 pub use reflectance::{Reflectance, Scattered};
 pub use source::{Emission, Emitter, Light, Sources};
 
@@ -61,6 +63,8 @@ pub struct Model {
     pub surface_of: Vec<u32>,
     /// Materials.
     pub surfaces: Vec<Surface>,
+    /// The nodes at which the triangles hang.
+    pub nodes: Nodes,
     /// Point, spot and directional lights.
     pub lights: Vec<Light>,
     /// Cameras.
@@ -77,6 +81,8 @@ pub struct Scene {
     pub sources: Sources,
     /// Cameras of the scene file.
     pub cameras: Vec<CameraNode>,
+    /// Nodes of the scene file, and which surface hangs at which.
+    pub nodes: Nodes,
     /// What was ignored or replaced, each with its effect.
     pub warnings: Vec<String>,
     /// Added to a position of the job or of the file it gives the position in the scene \[m\].
@@ -84,6 +90,7 @@ pub struct Scene {
     surfaces: Vec<Surface>,
     surface_of: Vec<u32>,
     has_peaks: bool,
+    reflects: bool,
 }
 
 impl Scene {
@@ -128,8 +135,11 @@ impl Scene {
             return Err(Error::input("scene", "luminous flux", flux, allowed));
         }
         let cameras = model.cameras.into_iter().map(|c| CameraNode { eye: c.eye + offset, ..c }).collect();
-        let has_peaks = surface_of.iter().any(|&s| surfaces[s as usize].reflectance.is_peaked());
-        Ok(Scene { geometry, sources, cameras, warnings, offset, surfaces, surface_of, has_peaks })
+        let used = || surface_of.iter().map(|&s| &surfaces[s as usize].reflectance);
+        let has_peaks = used().any(Reflectance::is_peaked);
+        let reflects = used().any(|r| !r.is_black());
+        let nodes = model.nodes;
+        Ok(Scene { geometry, sources, cameras, nodes, warnings, offset, surfaces, surface_of, has_peaks, reflects })
     }
 
     /// A position of the job in the coordinates of the scene \[m\].
@@ -157,6 +167,11 @@ impl Scene {
         !hit.front && !self.surface(hit.primitive).double_sided
     }
 
+    /// True when some surface reflects light that connections can carry.
+    pub fn reflects(&self) -> bool {
+        self.reflects
+    }
+
     /// True when some surface reflects in a peaked lobe.
     pub fn has_peaks(&self) -> bool {
         self.has_peaks
@@ -170,7 +185,9 @@ impl Scene {
     /// Memory of geometry and surfaces \[bytes\].
     pub fn bytes(&self) -> u64 {
         let surfaces = self.surfaces.len() * size_of::<Surface>() + 4 * self.surface_of.len();
-        self.geometry.bytes() + (surfaces + self.sources.emitters.len() * (size_of::<Emitter>() + 8)) as u64
+        self.geometry.bytes()
+            + self.nodes.bytes()
+            + (surfaces + self.sources.emitters.len() * (size_of::<Emitter>() + 8)) as u64
     }
 }
 

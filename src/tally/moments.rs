@@ -3,8 +3,8 @@
 //! Central sums lose no digits where raw sums of squares would (a mean 10^4 times the standard deviation costs raw
 //! sums half their digits), and merge exactly as written in docs/method.md, equation (11.1).
 
-use super::Scores;
 use super::statistics::Estimate;
+use super::{Scores, informed};
 use serde::{Deserialize, Serialize};
 
 /// Columns of a run of bins: the unit in which maps are stored and merged.
@@ -110,14 +110,9 @@ impl MomentBlock {
         }
     }
 
-    /// The estimate of bin `i` over `n` batches. A bin whose receiver existed but that no history ever reached has no
-    /// information about reflected light, whatever its direct part says: its error is NaN, never 0.
+    /// The estimate of bin `i` over `n` batches; its error is NaN without information, see [`informed`].
     pub fn estimate(&self, i: usize, n: u64) -> Estimate {
-        let mut estimate = Estimate::from_moments(n, self.mean[i], self.m2[i]);
-        if self.existed[i] > 0 && self.peak[i] == 0.0 {
-            estimate.standard_error = f64::NAN;
-        }
-        estimate
+        Estimate::from_moments(n, self.mean[i], self.m2[i]).or_no_error(informed(self.existed[i], self.peak[i]))
     }
 }
 

@@ -1,6 +1,7 @@
 //! Every batch's score of every bin: moments of any order, and later the jackknife, come from these.
 
 use super::statistics::Estimate;
+use super::{Scores, informed};
 use serde::{Deserialize, Serialize};
 
 /// Batch scores row by row: entry `batch * bins + bin`.
@@ -12,25 +13,50 @@ pub struct Replicates {
     pub value: Vec<f64>,
     /// The sampled direct part of each score.
     pub direct: Vec<f64>,
+    /// Largest total of a single history, one entry a bin.
+    pub peak: Vec<f64>,
+    /// Batches in which the receiver of the bin existed, one entry a bin.
+    pub existed: Vec<u64>,
 }
 
 impl Replicates {
     /// No batches yet of `bins` bins.
     pub fn new(bins: usize) -> Self {
-        Replicates { bins: bins as u64, value: Vec::new(), direct: Vec::new() }
+        let (value, direct) = (Vec::new(), Vec::new());
+        Replicates { bins: bins as u64, value, direct, peak: vec![0.0; bins], existed: vec![0; bins] }
+    }
+
+    /// Takes in a batch of numbers whose single histories are not known: what the batch adds to its direct
+    /// part stands for one.
+    pub fn accumulate(&mut self, value: &[f64], direct: &[f64]) {
+        let peak: Vec<f64> = value.iter().zip(direct).map(|(v, d)| (v - d).abs()).collect();
+        self.take(value, direct, &peak, &vec![true; value.len()]);
     }
 
     /// Takes in the scores of one batch.
-    pub fn accumulate(&mut self, value: &[f64], direct: &[f64]) {
-        assert!(value.len() as u64 == self.bins && direct.len() == value.len(), "scores of another shape");
+    pub fn accumulate_scores(&mut self, scores: &Scores) {
+        self.take(&scores.value, &scores.direct, &scores.peak, &scores.existed);
+    }
+
+    fn take(&mut self, value: &[f64], direct: &[f64], peak: &[f64], existed: &[bool]) {
+        let lengths = [value.len(), direct.len(), peak.len(), existed.len()];
+        assert!(lengths.iter().all(|&n| n as u64 == self.bins), "scores of another shape");
         self.value.extend_from_slice(value);
         self.direct.extend_from_slice(direct);
+        for i in 0..value.len() {
+            self.peak[i] = self.peak[i].max(peak[i]);
+            self.existed[i] += u64::from(existed[i]);
+        }
     }
 
     /// True when this holds `batches` whole batches of `bins` bins, as one read from a file must.
     pub fn has_shape(&self, bins: usize, batches: u64) -> bool {
         let entries = (bins as u64).checked_mul(batches);
-        self.bins == bins as u64 && entries == Some(self.value.len() as u64) && self.direct.len() == self.value.len()
+        self.bins == bins as u64
+            && entries == Some(self.value.len() as u64)
+            && self.direct.len() == self.value.len()
+            && self.peak.len() == bins
+            && self.existed.len() == bins
     }
 
     /// Appends the batches of the next shard.
@@ -38,6 +64,11 @@ impl Replicates {
         assert_eq!(self.bins, next.bins, "replicates of another shape");
         self.value.append(&mut next.value);
         self.direct.append(&mut next.direct);
+        for i in 0..self.peak.len() {
+            self.peak[i] = self.peak[i].max(next.peak[i]);
+            // Saturating: a count from a file is not ours to trust.
+            self.existed[i] = self.existed[i].saturating_add(next.existed[i]);
+        }
     }
 
     /// Number of batches.
@@ -55,12 +86,9 @@ impl Replicates {
         Estimate::from_scores(self.direct.iter().skip(bin).step_by(self.bins as usize).copied()).mean
     }
 
-    /// The estimate of one bin. A bin that never scored has no information: its error is NaN, never 0.
+    /// The estimate of one bin; its error is NaN without information, see [`informed`].
     pub fn estimate(&self, bin: usize) -> Estimate {
-        let mut estimate = Estimate::from_scores(self.scores(bin));
-        if self.scores(bin).all(|x| x == 0.0) {
-            estimate.standard_error = f64::NAN;
-        }
-        estimate
+        let estimate = Estimate::from_scores(self.scores(bin));
+        estimate.or_no_error(informed(self.existed[bin], self.peak[bin]))
     }
 }

@@ -1,5 +1,6 @@
 //! From batch scores to estimates, intervals and figures of merit (docs/method.md, "Statistics").
 
+use super::student::{MANY, tail_quantile};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// The number with its error: mean of batch scores and standard error of that mean.
@@ -9,7 +10,7 @@ pub struct Estimate {
     pub n: u64,
     /// Mean of the batch scores; NaN for n = 0.
     pub mean: f64,
-    /// Standard error of the mean, sqrt(M2 / (n (n-1))); NaN below n = 2 and where nothing ever scored.
+    /// Standard error of the mean, sqrt(M2 / (n (n-1))); NaN below n = 2 and without information.
     pub standard_error: f64,
 }
 
@@ -41,6 +42,18 @@ impl Estimate {
         Estimate { mean: self.mean + offset, ..self }
     }
 
+    /// The estimate of bin `bin` of which this is the random part: `fixed` is the part without error, one entry a bin,
+    /// NaN where there is no receiver, or empty for zero everywhere. None without a receiver.
+    pub fn with_fixed(self, fixed: &[f64], bin: usize) -> Option<Self> {
+        let offset = fixed.get(bin).copied().unwrap_or(0.0);
+        (!offset.is_nan()).then(|| self.shifted(offset))
+    }
+
+    /// The same estimate with the error NaN unless `informed`.
+    pub fn or_no_error(self, informed: bool) -> Self {
+        if informed { self } else { Estimate { standard_error: f64::NAN, ..self } }
+    }
+
     /// Standard error over the size of the mean.
     pub fn relative_error(self) -> f64 {
         self.standard_error / self.mean.abs()
@@ -61,6 +74,9 @@ impl Estimate {
 pub fn student_quantile(confidence: f64, n: u64) -> f64 {
     if n < 2 {
         return f64::NAN;
+    }
+    if (n - 1) as f64 >= MANY {
+        return tail_quantile(0.5 * (1.0 - confidence), n);
     }
     let student = StudentsT::new(0.0, 1.0, (n - 1) as f64).expect("scale and freedom are positive");
     let quantile = student.inverse_cdf(0.5 + 0.5 * confidence);

@@ -113,7 +113,8 @@ pub struct Rule {
     pub orders: Range<u32>,
 }
 
-/// Connects the `histories` of `connectors` to all links in `tiles`; entry i of `connected` belongs to owner i.
+/// Connects the `histories` of `connectors` to all links in `tiles`; entry i of `connected` belongs to owner i, and entry i of
+/// `start` is what every history has there before it is connected: direct light at the points of a continuation.
 ///
 /// # Panics
 /// With more than [`TILE`] owners.
@@ -123,12 +124,13 @@ pub fn connect(
     histories: Range<usize>,
     tiles: &[&Tile],
     rule: &Rule,
+    start: &[Colour],
     connected: &mut [Connected],
 ) {
-    assert!(connected.len() <= TILE, "at most {TILE} owners");
+    assert!(start.len() == connected.len() && start.len() <= TILE, "at most {TILE} owners");
     match rule.channels {
-        1 => connect_channels::<1>(scene, connectors.iter(histories), tiles, rule, connected),
-        _ => connect_channels::<3>(scene, connectors.iter(histories), tiles, rule, connected),
+        1 => connect_channels::<1>(scene, connectors.iter(histories), tiles, rule, start, connected),
+        _ => connect_channels::<3>(scene, connectors.iter(histories), tiles, rule, start, connected),
     }
 }
 
@@ -137,13 +139,14 @@ fn connect_channels<'a, const C: usize>(
     histories: impl Iterator<Item = &'a [Connector]>,
     tiles: &[&Tile],
     rule: &Rule,
+    start: &[Colour],
     connected: &mut [Connected],
 ) {
     let mut sums = [[0f32; TILE]; C];
     let mut totals = [Colour::BLACK; TILE];
     for history in histories {
         let totals = &mut totals[..connected.len()];
-        totals.fill(Colour::BLACK);
+        totals.copy_from_slice(start);
         for tile in tiles {
             sums.iter_mut().for_each(|s| s[..tile.links.len()].fill(0.0));
             for vertex in history.iter().filter(|v| rule.orders.contains(&(v.order + tile.depth))) {

@@ -64,7 +64,7 @@ pub fn continue_from(scene: &Scene, receiver: &Receiver, bound: f64, rng: &mut G
         let size = weight.luminance();
         let survival = size / (ROULETTE_BELOW * *first.get_or_insert(size));
         if survival < 1.0 {
-            if rng.uniform() >= survival {
+            if !rng.chance(survival) {
                 break;
             }
             weight = weight / survival;

@@ -20,7 +20,7 @@ const FAR: f64 = 3.0;
 /// Area-light samples of one receiver and batch: proportional to the histories, so that no share of the variance
 /// stays when the histories grow.
 pub fn emitter_samples(histories: u64) -> u64 {
-    (histories / 8).max(1)
+    (histories / 4).max(1)
 }
 
 /// Light from point, spot and directional lights, times the response \[lx or cd/m2\].

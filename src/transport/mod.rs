@@ -40,8 +40,10 @@
 
 pub mod connection;
 pub mod continuation;
+pub mod crossing;
 pub mod direct;
 pub mod eye;
 pub mod receiver;
+pub mod reverse;
 mod spherical_triangle;
 pub mod trajectory;

@@ -34,6 +34,43 @@ pub struct Vertex {
     pub after_delta: bool,
 }
 
+/// The straight way of light from one surface, or from its source, to the next.
+#[derive(Clone, Copy, Debug)]
+pub struct Segment {
+    /// Where it starts, and its direction.
+    pub ray: Ray,
+    /// Its length \[m\]; infinite where it meets nothing.
+    pub length: f64,
+    /// The flux weight on the way \[lm\].
+    pub weight: Colour,
+    /// Reflections that the light has seen; 0 on the way from the source.
+    pub order: u32,
+}
+
+/// What is taken down of a history as it goes.
+pub trait Record {
+    /// The history went along `segment`.
+    fn segment(&mut self, segment: Segment);
+    /// The segment ended at `vertex`, where connections may start.
+    fn vertex(&mut self, vertex: Vertex);
+}
+
+impl Record for Vec<Vertex> {
+    fn segment(&mut self, _: Segment) {}
+
+    fn vertex(&mut self, vertex: Vertex) {
+        self.push(vertex);
+    }
+}
+
+impl Record for Vec<Segment> {
+    fn segment(&mut self, segment: Segment) {
+        self.push(segment);
+    }
+
+    fn vertex(&mut self, _: Vertex) {}
+}
+
 /// Luminous flux of one or more histories by its fate \[lm\].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FluxBalance {
@@ -66,8 +103,8 @@ impl FluxBalance {
     }
 }
 
-/// Traces one history; its vertices are appended to `vertices`.
-pub fn trace(scene: &Scene, transport: &Transport, rng: &mut Generator, vertices: &mut Vec<Vertex>) -> FluxBalance {
+/// Traces one history; its vertices or its segments are appended to `record`.
+pub fn trace(scene: &Scene, transport: &Transport, rng: &mut Generator, record: &mut impl Record) -> FluxBalance {
     let start = scene.sources.emit(&scene.geometry, rng);
     let first = start.weight.luminance();
     let mut flux = FluxBalance { emitted: first, ..FluxBalance::default() };
@@ -75,7 +112,10 @@ pub fn trace(scene: &Scene, transport: &Transport, rng: &mut Generator, vertices
     let mut weight = start.weight;
     let mut after_delta = false;
     for order in 1..=MAX_VERTICES {
-        let Some(hit) = scene.geometry.closest_hit(&ray) else {
+        let hit = scene.geometry.closest_hit(&ray);
+        let length = hit.map_or(f64::INFINITY, |h| h.distance);
+        record.segment(Segment { ray, length, weight, order: order - 1 });
+        let Some(hit) = hit else {
             flux.escaped += weight.luminance();
             return flux;
         };
@@ -86,7 +126,7 @@ pub fn trace(scene: &Scene, transport: &Transport, rng: &mut Generator, vertices
         let reflectance = &scene.surface(hit.primitive).reflectance;
         if !reflectance.is_black() {
             let (position, normal, w_in) = (hit.position, hit.normal, ray.direction);
-            vertices.push(Vertex { position, normal, w_in, weight, primitive: hit.primitive, order, after_delta });
+            record.vertex(Vertex { position, normal, w_in, weight, primitive: hit.primitive, order, after_delta });
         }
         if reflectance.has_delta() {
             flux.met_delta += weight.luminance();
@@ -121,5 +161,5 @@ fn play(roulette: Roulette, first: f64, weight: Colour, reflected: Colour, rng: 
     if survival >= 1.0 {
         return Some(reflected);
     }
-    (rng.uniform() < survival).then(|| reflected / survival)
+    rng.chance(survival).then(|| reflected / survival)
 }

@@ -4,8 +4,11 @@
 pub mod battery;
 pub mod scenes;
 
-use lampyris::scene::Model;
+use lampyris::photometry::Colour;
+use lampyris::scene::{Model, Scene};
 pub use lampyris::tally::statistics::Estimate;
+use lampyris::transport::connection::{self, Connected, Connectors, Link, Rule, Tile};
+use lampyris::transport::receiver::Receiver;
 pub use lampyris::validate::Comparison;
 use lampyris::validate::Experiment;
 pub use lampyris::validate::experiment::{estimates, flux};
@@ -29,6 +32,17 @@ impl Deref for Case {
     fn deref(&self) -> &Experiment {
         &self.0
     }
+}
+
+/// All histories connected to `receivers`, each by itself, with the bound b and nothing else: no continuation.
+pub fn connect(scene: &Scene, histories: &Connectors, bound: f64, receivers: &[Receiver]) -> Vec<Connected> {
+    let links = receivers.iter().enumerate().map(|(owner, &receiver)| Link { owner, receiver }).collect();
+    let tile = Tile::new(scene, links, 0);
+    let rule = Rule { bound, channels: 1, orders: 0..u32::MAX };
+    let start = vec![Colour::BLACK; receivers.len()];
+    let mut connected = vec![Connected::default(); receivers.len()];
+    connection::connect(scene, histories, 0..histories.histories(), &[&tile], &rule, &start, &mut connected);
+    connected
 }
 
 pub fn compare(name: impl ToString, estimate: Estimate, reference: f64) -> Comparison {

@@ -8,8 +8,8 @@ use std::path::Path;
 
 /// Maps of the job, each of ten channels, and its tables.
 const MAPS: [&str; 3] = ["view", "eye", "wall"];
-const CHANNELS: usize = 10;
-const TABLES: [&str; 3] = ["table_height", "floor", "points"];
+const CHANNELS: usize = 11;
+const TABLES: [&str; 4] = ["table_height", "floor", "points", "regions"];
 
 /// All numbers of a results folder.
 #[derive(Clone, Debug, PartialEq)]

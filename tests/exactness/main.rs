@@ -16,4 +16,5 @@ mod place;
 mod process;
 mod refusals;
 mod signals;
+mod stopping;
 mod workers;

@@ -93,7 +93,7 @@ fn foreign_and_misplaced_checkpoints_are_refused() {
     let (place, dir, _) = computed_place();
     let path = dir.join(checkpoint(SHARD));
     // Another plan: one lux-meter, so that it is quick.
-    let text = "scene = \"room.glb\"\n[run]\nbatches = 10\nbatches_per_shard = 5\n\
+    let text = "scene = \"room.glb\"\n[run]\nbatches = 16\nbatches_per_shard = 5\n\
                 [[point]]\nname = \"table\"\nposition = [3.8, 0.8, -2.45]\nnormal = [0.0, 1.0, 0.0]\n";
     fs::write(place.path("foreign.toml"), text).unwrap();
     let foreign = place.plan(&place.path("foreign.toml"), "foreign");

@@ -33,6 +33,36 @@ fn one_and_two_threads_give_the_same_bits() {
 }
 
 #[test]
+fn quasi_random_batches_are_as_exact_as_random_ones() {
+    let place = Place::new();
+    let job = place.edited_job("rqmc.toml", "sampling = \"random\"", "sampling = \"rqmc\"");
+    let by = |workers| {
+        let dir = place.path(&format!("rqmc-{workers}"));
+        expect(0, &mut run_quietly(&job, &dir, workers));
+        Bits::of(&dir)
+    };
+    let bits = by(1);
+    bits.assert_same(&by(3));
+    assert_ne!(bits.digest, straight().bits.digest);
+    // Deaths after a first checkpoint of every shard, then one thread.
+    let dir = place.plan(&job, "resumed");
+    for shard in 0..SHARDS {
+        work(&dir, shard).env("LAMPYRIS_FAULT", "after-rename:1").output().unwrap();
+        assert!(batches(&dir, shard) > 0);
+        expect(0, lampyris(&["work", "--threads", "1"]).arg(&dir).args(["--shard", &shard.to_string()]));
+    }
+    expect(0, lampyris(&["merge"]).arg(&dir));
+    Bits::of(&dir).assert_same(&bits);
+    // Extended from 17 batches, which end inside a shard.
+    let text = std::fs::read_to_string(&job).unwrap().replace("batches = 28", "batches = 17");
+    std::fs::write(place.path("short.toml"), text).unwrap();
+    let dir = place.path("extended");
+    expect(0, &mut run_quietly(&place.path("short.toml"), &dir, 2));
+    expect(0, &mut run_quietly(&job, &dir, 2));
+    Bits::of(&dir).assert_same(&bits);
+}
+
+#[test]
 fn two_workers_on_one_shard_do_no_harm() {
     let place = Place::new();
     let dir = place.planned("dir");

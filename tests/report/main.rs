@@ -1,15 +1,18 @@
 //! What is written is what was counted: every file of a results folder is read back and compared with a tally made
 //! by hand.
 
+mod derived;
+mod health;
 mod maps;
 mod tables;
 mod whole;
 
+use lampyris::farm::merge::goal::{Look, Stopped};
 use lampyris::farm::merge::{Merged, SetResult};
 use lampyris::farm::plan::{Input, Plan, SceneSummary};
 use lampyris::job::Job;
 use lampyris::report;
-use lampyris::tally::{FLUX_BINS, MomentBlock, Replicates};
+use lampyris::tally::{FLUX_BINS, MomentBlock, Monitor, Replicates, Watched};
 use std::path::Path;
 
 /// Two-sided 95 % Student quantile for 20 batches, from a printed table.
@@ -22,6 +25,7 @@ const JOB: &str = r#"
 seed = 7
 histories_per_batch = 10
 batches = 20
+sampling = "random"
 [[camera]]
 name = "view"
 eye = [0.0, 0.0, 0.0]
@@ -98,6 +102,16 @@ fn replicates(bins: usize, n: u64) -> Replicates {
     scores
 }
 
+/// The lux-meter, watched: ten histories a batch that make up its score.
+fn monitor(n: u64) -> Monitor {
+    let mut monitor = Monitor::new(0);
+    for batch in 0..n {
+        let score = if batch % 2 == 0 { 2.0 } else { 0.0 };
+        monitor.accumulate(score, &Watched { totals: (0..10).map(|i| score * f64::from(i) / 4.5).collect() });
+    }
+    monitor
+}
+
 /// 12 lm emitted in every batch, 9 and 11 absorbed in turn, 2 escaped, nothing lost, 3 that met a mirror.
 fn flux(n: u64) -> Replicates {
     let mut flux = Replicates::new(FLUX_BINS.len());
@@ -117,9 +131,12 @@ fn merged(n: u64) -> Merged {
             SetResult::Replicates { scores: replicates(6, n), fixed_direct: fixed },
             SetResult::Replicates { scores: replicates(1, n), fixed_direct: Vec::new() },
         ],
+        monitors: vec![Vec::new(), Vec::new(), Vec::new(), vec![monitor(n)]],
         flux: flux(n),
         batches: n,
         missing: Vec::new(),
+        stopped: None,
+        looks: Vec::new(),
         seconds: 4.0,
     }
 }

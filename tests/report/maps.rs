@@ -33,6 +33,7 @@ fn exr_channels_hold_value_error_interval_peak_and_direct() {
             "luminance.Y",
             "luminance.ciLower",
             "luminance.ciUpper",
+            "luminance.health",
             "luminance.peak",
             "luminance.standardError",
             "luminance.variance"
@@ -72,6 +73,7 @@ fn exr_header_says_what_the_numbers_are() {
     let attribute = |name: &str| &layer.attributes.other[&Text::from(name)];
     let expected = [
         ("units", "cd/m2"),
+        ("estimate", "bounded"),
         ("batches", "20"),
         ("historiesPerBatch", "10"),
         ("histories", "200"),

@@ -71,3 +71,55 @@ fn text_summary_is_short_and_names_what_matters() {
         assert!(text.contains(&format!("warning: {warning}")), "{warning} is not in\n{text}");
     }
 }
+
+/// The job with a goal: 1 % at 90 % of the bins of two sets.
+fn aiming(limit: u64) -> Plan {
+    let stop = format!(
+        "[stop]\nrelative_half_width = 0.01\nreceivers = [\"desk\", \"meter\"]\nshare = 0.9\n\
+         max_batches = {limit}\n[[camera]]"
+    );
+    let mut plan = plan(&JOB.replace("batches = 20\n", "").replacen("[[camera]]", &stop, 1));
+    plan.scene.warnings.clear();
+    plan
+}
+
+#[test]
+fn what_ended_a_run_with_a_goal_is_said() {
+    let look = |batches: u64, relative_half_width: f64, reached: bool| {
+        let set = "desk".to_owned();
+        Look { batches, relative_half_width, set, reached }
+    };
+    let mut result = merged(96);
+    result.looks = vec![look(32, f64::INFINITY, false), look(64, 0.0156789, false), look(96, 0.0099, true)];
+    result.stopped = Some(Stopped::GoalReached { batches: 96 });
+    let s = summary(written(&aiming(1000), &result).path());
+    let by = &s["stopped_by"];
+    assert_eq!((&by["what"], &by["batches"], &by["look"]), (&"goal".into(), &96.into(), &3.into()));
+    assert_eq!(
+        (&by["relative_half_width"], &by["share"], &by["max_batches"]),
+        (&0.01.into(), &0.9.into(), &1000.into())
+    );
+    assert!(by["looks"][0]["relative_half_width"].is_null(), "no information is no number");
+    assert_eq!((&by["looks"][1]["batches"], &by["looks"][1]["set"]), (&64.into(), &"desk".into()));
+    let text = report::text_summary(&aiming(1000), &result);
+    let line = "\nstopped at 96 batches (look 3): the 95 % interval of desk, meter is within 1 % in 90 % of the bins\n";
+    assert!(text.contains(line) && !text.contains("limit"), "{text}");
+
+    result.looks.pop();
+    result.stopped = Some(Stopped::Limit);
+    let text = report::text_summary(&aiming(96), &result);
+    assert!(text.contains("\nnot stopped by its goal: 96 of at most 96 batches\n"), "{text}");
+    let warning = "warning: the limit of 96 batches came before the goal that the 95 % interval of desk, meter is within \
+                   1 % in 90 % of the bins; at the last look, 64 batches, desk stood at 1.57 %\n";
+    assert!(text.contains(warning), "{text}");
+    result.looks.pop();
+    let text = report::text_summary(&aiming(96), &result);
+    assert!(text.contains("; at the last look, 32 batches, too many bins of desk had no information\n"), "{text}");
+
+    result.stopped = None;
+    result.missing.push(96..1000);
+    let (text, plan) = (report::text_summary(&aiming(1000), &result), aiming(1000));
+    assert!(text.contains("96 of at most 1000 batches") && !text.contains("limit"), "{text}");
+    assert_eq!(summary(written(&plan, &result).path())["stopped_by"]["what"], "nothing");
+    assert!(summary(written(&self::plan(JOB), &merged(20)).path())["stopped_by"].is_null(), "no goal");
+}

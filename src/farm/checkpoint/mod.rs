@@ -91,6 +91,11 @@ pub enum Content {
         /// Receiver set.
         set: u32,
     },
+    /// A [`crate::tally::Monitor`] for each monitored bin of a set that has any.
+    Monitors {
+        /// Receiver set.
+        set: u32,
+    },
 }
 
 impl Header {
@@ -108,7 +113,9 @@ fn layout(shapes: &[SetShape]) -> Vec<Content> {
         Kept::EveryBatch => vec![Content::Replicates { set }],
     });
     let fixed = numbered().map(|(set, _)| Content::FixedDirect { set });
-    tallies.chain([Content::Flux]).chain(fixed).collect()
+    let monitored = numbered().filter(|(_, shape)| !shape.monitored.is_empty());
+    let monitors = monitored.map(|(set, _)| Content::Monitors { set });
+    tallies.chain([Content::Flux]).chain(fixed).chain(monitors).collect()
 }
 
 /// Number of blocks of a set of which moments are kept.

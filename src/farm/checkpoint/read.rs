@@ -5,7 +5,7 @@ use super::{block_count, block_range, checksum, layout};
 use crate::error::{Error, Result};
 use crate::farm::plan::Plan;
 use crate::job::{Kept, SetShape};
-use crate::tally::{FLUX_BINS, MomentBlock, Moments, Replicates, SetTally, Tally};
+use crate::tally::{FLUX_BINS, MomentBlock, Moments, Monitor, Replicates, SetTally, Tally};
 use serde::de::DeserializeOwned;
 use std::fs::File;
 use std::io::{self, ErrorKind, Read, Seek, SeekFrom};
@@ -92,6 +92,21 @@ impl Reader {
         self.section(Content::FixedDirect { set: number(set) }, |v: &Vec<f64>| v.is_empty() || v.len() == bins)
     }
 
+    /// The monitored bins of a set, in their order; none where nothing is monitored.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] for damage; [`Error::Io`].
+    pub fn monitors(&mut self, set: usize) -> Result<Vec<Monitor>> {
+        let (bins, batches) = (self.shapes[set].monitored.clone(), self.header.batches());
+        if bins.is_empty() {
+            return Ok(Vec::new());
+        }
+        let fits = |m: &Vec<Monitor>| {
+            m.len() == bins.len() && m.iter().zip(&bins).all(|(monitor, &bin)| monitor.has_shape(bin, batches))
+        };
+        self.section(Content::Monitors { set: number(set) }, fits)
+    }
+
     /// Checksums of the sections of fixed direct light, in set order: equal exactly when the light is.
     pub fn fixed_direct_checksums(&self) -> Vec<Checksum> {
         let fixed = self.header.sections.iter().filter(|s| matches!(s.content, Content::FixedDirect { .. }));
@@ -104,7 +119,8 @@ impl Reader {
     /// [`Error::Refused`] for damage; [`Error::Io`].
     pub fn tally(&mut self) -> Result<Tally> {
         let sets = (0..self.shapes.len()).map(|set| self.set_tally(set)).collect::<Result<_>>()?;
-        Ok(Tally { sets, flux: self.flux()?, digests: self.header.digests.clone() })
+        let monitors = (0..self.shapes.len()).map(|set| self.monitors(set)).collect::<Result<_>>()?;
+        Ok(Tally { sets, monitors, flux: self.flux()?, digests: self.header.digests.clone() })
     }
 
     fn set_tally(&mut self, set: usize) -> Result<SetTally> {
@@ -142,6 +158,10 @@ impl Reader {
             Content::Replicates { set } => before(set as usize),
             Content::Flux => before(self.shapes.len()),
             Content::FixedDirect { set } => before(self.shapes.len()) + 1 + set as usize,
+            Content::Monitors { set } => {
+                let monitored = self.shapes[..set as usize].iter().filter(|s| !s.monitored.is_empty());
+                before(self.shapes.len()) + 1 + self.shapes.len() + monitored.count()
+            }
         }
     }
 }

@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::farm::folder::Folder;
 use crate::farm::plan::Plan;
 use crate::farm::testing::{JOB, fixed_direct, plan, plan_of, save, save_tally, tally};
-use crate::tally::{BatchScores, Scores, Tally};
+use crate::tally::{BatchScores, Monitor, Scores, Tally};
 use std::fs;
 use std::path::Path;
 
@@ -187,6 +187,57 @@ fn never_replaced_by_fewer_batches_nor_by_others() {
     assert_eq!(fs::read(&path).unwrap(), b"precious");
 }
 
+#[test]
+fn monitored_bins_are_stored_in_sections_of_their_own() {
+    let (_temp, folder) = folder();
+    let watched = JOB
+        .replace("width = 5\n", "width = 5\nmonitor = [[4, 2], [0, 1]]\n")
+        .replace("columns = 65\n", "columns = 65\nmonitor = [[64, 63]]\n");
+    let plan = plan_of(&watched).unwrap();
+    save(&folder, &plan, 1, 3).unwrap();
+    let path = folder.shard_path(1);
+    let (read, _) = read_all(&path, &plan).unwrap();
+    let written = tally(&plan, 1, 3);
+    assert_eq!(read.monitors, written.monitors);
+    let bins: Vec<Vec<u32>> = read.monitors.iter().map(|set| set.iter().map(|m| m.bin).collect()).collect();
+    assert_eq!(bins, [vec![5, 14], vec![65 * 64 - 1], vec![], vec![0]]);
+    assert_eq!(read.monitors[1][0].scores.len(), 3);
+    assert_eq!(read.monitors[1][0].histories[2].n, 64);
+    assert!((50..150).contains(&read.monitors[1][0].largest.len()));
+    let header = read_header(&path, &plan, 1).unwrap().unwrap();
+    let monitors: Vec<Content> = header.sections.iter().rev().take(3).map(|s| s.content).collect();
+    assert_eq!(monitors, [3, 1, 0].map(|set| Content::Monitors { set }));
+}
+
+/// A file whose last section, the monitors of the lux-meter, is replaced by `monitors`, with the right checksum.
+fn forged_monitors(edit: impl Fn(&mut Vec<Monitor>)) -> String {
+    forged(|h, sections| {
+        let last = h.sections.last_mut().unwrap();
+        assert_eq!(last.content, Content::Monitors { set: 3 });
+        let mut monitors: Vec<Monitor> = postcard::from_bytes(&sections[last.offset as usize..]).unwrap();
+        edit(&mut monitors);
+        let bytes = postcard::to_stdvec(&monitors).unwrap();
+        sections.truncate(last.offset as usize);
+        sections.extend(&bytes);
+        (last.bytes, last.checksum) = (bytes.len() as u64, checksum(&bytes));
+    })
+}
+
+#[test]
+fn monitors_that_are_not_the_plans_are_refused() {
+    let shape = |edit: fn(&mut Vec<Monitor>)| {
+        assert!(forged_monitors(edit).contains("Monitors { set: 3 } is not of the plan's shape"));
+    };
+    shape(|m| m.clear());
+    shape(|m| m.push(Monitor::new(0)));
+    shape(|m| m[0].bin = 1);
+    shape(|m| m[0].scores.push(1.0));
+    shape(|m| m[0].histories.clear());
+    shape(|m| m[0].largest.reverse());
+    shape(|m| m[0].largest = vec![1.0; 201]);
+    shape(|m| m[0].largest[0] = f64::NAN);
+}
+
 /// The tally of the golden file: simple fractions, so that it depends on no generator.
 fn golden_tally(plan: &Plan) -> Tally {
     let mut tally = Tally::new(&plan.sets());
@@ -199,6 +250,8 @@ fn golden_tally(plan: &Plan) -> Tally {
                 s.existed[i] = (i + batch) % 3 > 0;
             }
             s.colour.iter_mut().enumerate().for_each(|(i, c)| *c = [fraction(i, 4), fraction(i, 5), fraction(i, 6)]);
+            let totals = |bin: usize| (0..4).map(|k| fraction(bin, k)).collect();
+            s.watched.iter_mut().enumerate().for_each(|(bin, w)| w.totals = totals(bin));
             s
         };
         let sets = plan.sets().iter().map(fill).collect();

@@ -107,6 +107,7 @@ fn encode(content: Content, snapshot: &Snapshot, shapes: &[SetShape]) -> Vec<u8>
         },
         Content::Flux => postcard::to_stdvec(&snapshot.tally.flux),
         Content::FixedDirect { set } => postcard::to_stdvec(&snapshot.fixed_direct[set as usize]),
+        Content::Monitors { set } => postcard::to_stdvec(&snapshot.tally.monitors[set as usize]),
     };
     encoded.expect("plain data of known length always has a postcard form")
 }

@@ -2,7 +2,9 @@
 //!
 //! It knows files and processes only: no tally, no photometry. Everything a worker has done lives in its
 //! checkpoint, so a worker, this process or the machine may die at any instant and the next run goes on from there.
+//! Whether a goal has been reached is decided by somebody else, from the same files; this module knows when to ask.
 
+mod look;
 mod machine;
 mod process;
 mod progress;
@@ -14,6 +16,7 @@ use super::folder::Folder;
 use super::plan::Plan;
 use super::status::ShardStatus;
 use crate::error::{Error, Result};
+use look::Watch;
 use process::{Exit, Worker};
 use progress::Progress;
 use signal_hook::consts::{SIGINT, SIGTERM};
@@ -39,23 +42,28 @@ pub struct Options {
 /// How a run ended when nothing failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ended {
-    /// Every batch had been done before: nothing was started.
+    /// Every batch had been done, or the goal been reached, before: nothing was started.
     WasDone,
-    /// Every batch of the plan is in a checkpoint.
+    /// Every batch of the plan is in a checkpoint, or enough of them that the goal is reached.
     Done,
     /// A signal asked to stop; what was done is in the checkpoints.
     Stopped,
 }
 
-/// Computes all that is unfinished of `plan` in `folder`.
+/// Says whether the plan in a folder has reached its goal: a function of the checkpoints there.
+pub type GoalReached<'a> = &'a dyn Fn(&Folder) -> Result<bool>;
+
+/// Computes all that is unfinished of `plan` in `folder`; where the plan has a goal, until `goal_reached` says so of the
+/// folder.
 ///
 /// # Errors
 /// [`Error::Refused`] for a checkpoint that is damaged or foreign, and what a worker refuses;
-/// [`Error::Failed`] for a shard that fails three times without progress.
-pub fn run(folder: &Folder, plan: &Plan, options: Options) -> Result<Ended> {
+/// [`Error::Failed`] for a shard that fails three times without progress; those of `goal_reached`.
+pub fn run(folder: &Folder, plan: &Plan, options: Options, goal_reached: GoalReached) -> Result<Ended> {
     let shards = read_shards(folder, plan)?;
     let waiting: VecDeque<u64> = shards.iter().filter(|s| s.batches < s.of).map(|s| s.shard).collect();
-    if waiting.is_empty() {
+    let mut watch = Watch::new(folder, plan, goal_reached);
+    if waiting.is_empty() || watch.goal_reached(&shards)? {
         return Ok(Ended::WasDone);
     }
     machine::check_memory(plan)?;
@@ -68,7 +76,7 @@ pub fn run(folder: &Folder, plan: &Plan, options: Options) -> Result<Ended> {
     let failures = vec![0; shards.len()];
     let mut progress = Progress::new(plan, &shards, options.quiet);
     let mut crew = Crew { folder, plan, slots, waiting, running: Vec::new(), shards, failures };
-    let ended = crew.work(&stop, &mut progress);
+    let ended = crew.work(&stop, &mut watch, &mut progress);
     // Whatever happened, nobody is left behind and every checkpoint is written.
     crew.dismiss()?;
     progress.finish(&crew.shards);
@@ -100,8 +108,8 @@ struct Crew<'a> {
 }
 
 impl Crew<'_> {
-    /// Until all is done, a signal asks to stop, or something fails.
-    fn work(&mut self, stop: &AtomicBool, progress: &mut Progress) -> Result<Ended> {
+    /// Until all is done, the goal is reached, a signal asks to stop, or something fails.
+    fn work(&mut self, stop: &AtomicBool, watch: &mut Watch, progress: &mut Progress) -> Result<Ended> {
         while !(self.waiting.is_empty() && self.running.is_empty()) {
             if stop.load(Ordering::Relaxed) {
                 return Ok(Ended::Stopped);
@@ -109,6 +117,9 @@ impl Crew<'_> {
             self.fill_slots()?;
             std::thread::sleep(POLL);
             self.collect()?;
+            if watch.goal_reached(&self.shards)? {
+                return Ok(Ended::Done);
+            }
             if progress.due() {
                 self.refresh()?;
                 progress.show(&self.shards);

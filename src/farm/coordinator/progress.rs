@@ -93,10 +93,14 @@ impl<'a> Progress<'a> {
         let mut parts = Vec::new();
         if rate > 0.0 {
             let left = (status.of - status.batches) as f64 / rate;
-            parts.push(format!("{rate:.2} batches/s, {left:.0} s left"));
+            let at_most = if status.goal.is_some() { "at most " } else { "" };
+            parts.push(format!("{rate:.2} batches/s, {at_most}{left:.0} s left"));
         }
         if let Some(error) = status.relative_error_estimate {
             parts.push(format!("median relative error about {:.2} %", 100.0 * error));
+        }
+        if let Some(look) = status.goal.and_then(|goal| goal.next_look) {
+            parts.push(format!("next look at {look}"));
         }
         (status.batches, parts.join(", "))
     }

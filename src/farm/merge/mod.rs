@@ -4,14 +4,23 @@
 //! copies count once and the order of the folders changes nothing. Files are read one after the other, a block of
 //! bins at a time, so memory holds the result and one block. A file that cannot be trusted stops the merge and is
 //! named, with the reason; nothing here writes. Merging knows neither scene nor random numbers.
+//!
+//! With a goal ([`goal`]) the fold ends at the first look of the plan at which it is reached. A look is judged once
+//! every shard before it is complete, and by these shards alone, so the result is a function of the checkpoint
+//! files: batches beyond it, by workers that ran ahead, change nothing.
 
-use super::checkpoint::{Checksum, Header, Reader, block_count, read_header};
+mod choose;
+pub mod goal;
+
+use super::checkpoint::{BLOCK, Checksum, Reader, block_count};
 use super::folder::Folder;
 use super::plan::Plan;
 use crate::error::{Error, Result};
 use crate::job::{Kept, SetShape};
-use crate::tally::{FLUX_BINS, MomentBlock, Replicates};
-use std::collections::BTreeMap;
+use crate::tally::statistics::Estimate;
+use crate::tally::{FLUX_BINS, MomentBlock, Monitor, Replicates};
+use choose::{Candidate, check_length, choose, common_plan};
+use goal::{Goal, Look, Stopped};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -41,13 +50,19 @@ pub enum SetResult {
 pub struct Merged {
     /// One for each receiver set in job order.
     pub sets: Vec<SetResult>,
+    /// For each receiver set its monitored bins, in their order.
+    pub monitors: Vec<Vec<Monitor>>,
     /// Flux balance, every batch.
     pub flux: Replicates,
     /// Batches merged.
     pub batches: u64,
-    /// Batches of the plan that are missing, as half-open ranges.
+    /// Batches of the plan that are missing, as half-open ranges; none when the goal has been reached.
     pub missing: Vec<Range<u64>>,
-    /// Time spent by all workers \[s\].
+    /// What ended the run; None when it is unfinished or has no goal.
+    pub stopped: Option<Stopped>,
+    /// What was seen at every look that could be judged, up to the one at which the goal was reached.
+    pub looks: Vec<Look>,
+    /// Time spent by all workers on the batches merged \[s\].
     pub seconds: f64,
 }
 
@@ -63,107 +78,57 @@ pub fn merge(folders: &[Folder]) -> Result<(Plan, Merged)> {
         let path = folders.first().map_or(Path::new("."), |f| f.root());
         return Err(Error::refused(path, "holds no checkpoint yet: nothing to merge"));
     }
-    let mut fold = Fold::new(&plan);
-    for file in chosen.values() {
-        fold.take(file)?;
-    }
-    let merged = fold.result();
+    let read = (0..plan.sets().len()).collect();
+    let merged = fold(&plan, chosen.values(), read)?.result();
     Ok((plan, merged))
 }
 
-/// The plan of all folders; the one with the most batches where they differ in that.
-fn common_plan(folders: &[Folder]) -> Result<Plan> {
-    let mut common: Option<Plan> = None;
-    for folder in folders {
-        let plan = folder.read_plan()?;
-        let Some(first) = &common else {
-            common = Some(plan);
-            continue;
-        };
-        let differences = plan.differences(first);
-        if !differences.is_empty() {
-            let reason = format!("another plan than that of the first folder:\n  {}", differences.join("\n  "));
-            return Err(Error::refused(&folder.plan_path(), reason));
-        }
-        if plan.job.run.batches > first.job.run.batches {
-            common = Some(plan);
-        }
-    }
-    common.ok_or_else(|| Error::input("command line", "DIR", "(none)", "at least one folder"))
+/// The number of batches after which the goal of the plan in `folders` has been reached; None when it has not yet.
+/// Reads no batch beyond the last look that can be judged, and no set that the goal does not ask for.
+///
+/// # Errors
+/// As [`merge`].
+pub fn goal_reached(folders: &[Folder]) -> Result<Option<u64>> {
+    let plan = common_plan(folders)?;
+    let Some(goal) = Goal::of(&plan) else { return Ok(None) };
+    let chosen = choose(&plan, folders)?;
+    let done = chosen.values().map(|c| (c.header.shard, c.header.batches()));
+    let last = plan.last_look(done).unwrap_or(0);
+    let before = chosen.values().take_while(|c| plan.shard(c.header.shard).start < last);
+    Ok(match fold(&plan, before, goal.sets())?.stopped() {
+        Some(Stopped::GoalReached { batches }) => Some(batches),
+        Some(Stopped::Limit) | None => None,
+    })
 }
 
-/// A checkpoint whose header was read.
-struct Candidate {
-    path: PathBuf,
-    header: Header,
-}
-
-/// For each shard the longest checkpoint. Everything that is wrong with any file is said at once.
-fn choose(plan: &Plan, folders: &[Folder]) -> Result<BTreeMap<u64, Candidate>> {
-    let mut chosen = BTreeMap::new();
-    let mut refused = Vec::new();
-    for folder in folders {
-        for (shard, path) in folder.checkpoints()? {
-            match read_checked(plan, shard, &path) {
-                Ok(Some(header)) => consider(&mut chosen, Candidate { path, header }, &mut refused),
-                Ok(None) => {}
-                Err(Error::Refused { path, reason }) => refused.push((path, reason)),
-                Err(e) => return Err(e),
-            }
+/// Folds the sets numbered in `read` shard after shard, up to the look at which the goal is reached.
+fn fold<'a>(plan: &'a Plan, files: impl Iterator<Item = &'a Candidate>, read: Vec<usize>) -> Result<Fold<'a>> {
+    let mut fold = Fold::new(plan, read);
+    for file in files {
+        fold.take(file)?;
+        if fold.goal_reached() {
+            break;
         }
     }
-    let Some((path, mut reason)) = refused.pop() else { return Ok(chosen) };
-    for (path, other) in refused {
-        reason = format!("{reason}\n{}: refused: {other}", path.display());
-    }
-    Err(Error::Refused { path, reason })
-}
-
-fn read_checked(plan: &Plan, shard: u64, path: &Path) -> Result<Option<Header>> {
-    let header = read_header(path, plan, shard)?;
-    header.iter().try_for_each(|header| check_length(plan, shard, path, header))?;
-    Ok(header)
-}
-
-/// Moments cannot be cut back to fewer batches, so a checkpoint beyond the plan is refused.
-fn check_length(plan: &Plan, shard: u64, path: &Path, header: &Header) -> Result<()> {
-    let start = shard.saturating_mul(plan.job.run.batches_per_shard);
-    let end = start.saturating_add(header.batches());
-    if header.batches() == 0 || end <= plan.job.run.batches {
-        return Ok(());
-    }
-    let batches = plan.job.run.batches;
-    let reason = format!("goes on to batch {end}, the plan ends at {batches}; set run.batches to at least {end}");
-    Err(Error::refused(path, reason))
-}
-
-/// Takes `new` into account for its shard.
-fn consider(chosen: &mut BTreeMap<u64, Candidate>, new: Candidate, refused: &mut Vec<(PathBuf, String)>) {
-    let shard = new.header.shard;
-    let Some(old) = chosen.get(&shard) else {
-        chosen.insert(shard, new);
-        return;
-    };
-    if let Some(i) = old.header.digests.iter().zip(&new.header.digests).position(|(a, b)| a != b) {
-        let reason = |other: &Path| format!("batch {i} of the shard is another than in {}", other.display());
-        refused.push((new.path.clone(), reason(&old.path)));
-        refused.push((old.path.clone(), reason(&new.path)));
-    } else if new.header.batches() > old.header.batches() {
-        chosen.insert(shard, new);
-    }
+    Ok(fold)
 }
 
 /// The left fold over shards.
 struct Fold<'a> {
     plan: &'a Plan,
     shapes: Vec<SetShape>,
+    /// Numbers of the sets that are folded; the others stay empty.
+    read: Vec<usize>,
     sets: Vec<SetFold>,
+    monitors: Vec<Vec<Monitor>>,
     flux: Replicates,
     /// Direct light of every set with the file and the checksums it was taken from.
     fixed: Option<(PathBuf, Vec<Checksum>, Vec<Vec<f64>>)>,
     batches: u64,
     seconds: f64,
     done: Vec<Range<u64>>,
+    goal: Option<Goal>,
+    looks: Vec<Look>,
 }
 
 /// One receiver set so far: maps as blocks, others whole.
@@ -172,16 +137,29 @@ enum SetFold {
     Replicates(Replicates),
 }
 
+impl SetFold {
+    /// The random part of a bin over `batches` batches.
+    fn estimate(&self, bin: usize, batches: u64) -> Estimate {
+        match self {
+            SetFold::Moments(blocks) => blocks[bin / BLOCK].estimate(bin % BLOCK, batches),
+            SetFold::Replicates(scores) => scores.estimate(bin),
+        }
+    }
+}
+
 impl<'a> Fold<'a> {
-    fn new(plan: &'a Plan) -> Self {
+    fn new(plan: &'a Plan, read: Vec<usize>) -> Self {
         let shapes = plan.sets();
         let empty = |shape: &SetShape| match shape.kept {
             Kept::Moments { .. } => SetFold::Moments(Vec::new()),
             Kept::EveryBatch => SetFold::Replicates(Replicates::new(shape.bins())),
         };
         let sets = shapes.iter().map(empty).collect();
+        let monitors = shapes.iter().map(Monitor::of_set).collect();
         let flux = Replicates::new(FLUX_BINS.len());
-        Fold { plan, shapes, sets, flux, fixed: None, batches: 0, seconds: 0.0, done: Vec::new() }
+        let (done, looks) = (Vec::new(), Vec::new());
+        let goal = Goal::of(plan);
+        Fold { plan, shapes, read, sets, monitors, flux, fixed: None, batches: 0, seconds: 0.0, done, goal, looks }
     }
 
     /// Folds in the next shard.
@@ -196,13 +174,17 @@ impl<'a> Fold<'a> {
         check_length(self.plan, shard, &file.path, reader.header())?;
         let n = reader.header().batches();
         self.take_fixed(&mut reader, &file.path)?;
-        for (set, fold) in self.sets.iter_mut().enumerate() {
-            match fold {
+        for &set in &self.read {
+            match &mut self.sets[set] {
                 SetFold::Moments(blocks) => {
                     take_blocks(blocks, &mut reader, set, &self.shapes[set], (self.batches, n))?
                 }
                 SetFold::Replicates(scores) => scores.append(reader.replicates(set)?),
             }
+        }
+        for (set, monitors) in self.monitors.iter_mut().enumerate() {
+            let next = reader.monitors(set)?;
+            monitors.iter_mut().zip(next).for_each(|(monitor, next)| monitor.append(next));
         }
         self.flux.append(reader.flux()?);
         let start = self.plan.shard(shard).start;
@@ -232,8 +214,36 @@ impl<'a> Fold<'a> {
         }
     }
 
+    /// Looks at the goal if a look of the plan comes here; true when it is reached.
+    fn goal_reached(&mut self) -> bool {
+        let Some(goal) = &self.goal else { return false };
+        // With a gap behind it a look cannot be judged, and none after it.
+        let whole = self.done.last().is_some_and(|last| last.end == self.batches);
+        if !whole || !self.plan.looks().contains(&self.batches) {
+            return false;
+        }
+        let fixed = self.fixed.as_ref().map_or(&[][..], |(.., fixed)| fixed);
+        let estimate = |set: usize, bin: usize| self.sets[set].estimate(bin, self.batches).with_fixed(&fixed[set], bin);
+        self.looks.push(goal.look(self.batches, estimate));
+        self.looks.last().is_some_and(|look| look.reached)
+    }
+
+    /// What ended the run so far folded.
+    fn stopped(&self) -> Option<Stopped> {
+        match self.looks.last() {
+            Some(look) if look.reached => Some(Stopped::GoalReached { batches: look.batches }),
+            _ if self.goal.is_some() && self.batches == self.plan.job.run.batches => Some(Stopped::Limit),
+            _ => None,
+        }
+    }
+
     fn result(self) -> Merged {
-        let missing = missing(self.plan.job.run.batches, &self.done);
+        let stopped = self.stopped();
+        let batches = match stopped {
+            Some(Stopped::GoalReached { batches }) => batches,
+            Some(Stopped::Limit) | None => self.plan.job.run.batches,
+        };
+        let missing = missing(batches, &self.done);
         let fixed = self.fixed.map(|(.., fixed)| fixed).unwrap_or_default();
         let sets = self.sets.into_iter().zip(fixed).map(|(set, fixed_direct)| match set {
             SetFold::Moments(blocks) => {
@@ -243,8 +253,9 @@ impl<'a> Fold<'a> {
             }
             SetFold::Replicates(scores) => SetResult::Replicates { scores, fixed_direct },
         });
-        let sets = sets.collect();
-        Merged { sets, flux: self.flux, batches: self.batches, missing, seconds: self.seconds }
+        let (sets, looks, monitors) = (sets.collect(), self.looks, self.monitors);
+        let Fold { flux, batches, seconds, .. } = self;
+        Merged { sets, monitors, flux, batches, missing, stopped, looks, seconds }
     }
 }
 

@@ -1,7 +1,9 @@
+use super::goal::relative_half_width;
 use super::*;
 use crate::farm::testing::{JOB, fixed_direct, plan, plan_of, save, save_tally, scores, tally};
 use crate::random::{Domain, Stream};
-use crate::tally::Tally;
+use crate::tally::statistics::student_quantile;
+use crate::tally::{HistoryMoments, Tally};
 
 /// Folders holding the plan and the checkpoints (shard, batches) of each list.
 fn folders(plan: &Plan, lists: &[&[(u64, u64)]]) -> (tempfile::TempDir, Vec<Folder>) {
@@ -52,7 +54,27 @@ fn the_merge_is_the_fold_over_shards_and_agrees_with_one_pass() {
             other => panic!("{other:?}"),
         }
     }
-    assert_eq!(result.flux, direct.flux);
+    assert_eq!((result.flux, result.monitors), (direct.flux, direct.monitors));
+}
+
+#[test]
+fn power_sums_of_watched_histories_do_not_depend_on_the_shards() {
+    // Shards of 4 batches and one shard of all: other random numbers would be another plan, so the tallies are made
+    // by hand from the same scores.
+    let plan = plan();
+    let (_temp, folders) = folders(&plan, &[ALL]);
+    let merged = merged(&folders).monitors[3][0].clone();
+    let mut totals: Vec<f64> = (0..10).flat_map(|b| scores(&plan, b).sets[3].watched[0].totals.clone()).collect();
+    let whole = HistoryMoments::of(&totals);
+    let sum = merged.histories.iter().fold(HistoryMoments::default(), |sum, next| sum.merged(*next));
+    assert_eq!(sum.n, 640);
+    for (a, b) in [(sum.mean, whole.mean), (sum.m2, whole.m2), (sum.m3, whole.m3), (sum.m4, whole.m4)] {
+        assert!((a - b).abs() <= 1e-12 * b.abs(), "{a} {b}");
+    }
+    totals.sort_by(|a, b| b.total_cmp(a));
+    assert_eq!(merged.largest, totals[..200]);
+    let of_batch = |b| scores(&plan, b).sets[3].value[0];
+    assert_eq!(merged.scores, (0..10).map(of_batch).collect::<Vec<_>>());
 }
 
 #[test]
@@ -160,4 +182,154 @@ fn folders_of_different_plans_are_refused_with_the_difference() {
     let (_b, foreign) = folders(&other, &[ALL]);
     both.extend(foreign);
     assert!(refusal(&both).contains("run.seed: 7 in the plan, 8 now"));
+}
+
+/// The job with the goal `half_width` of the sets `receivers`; looks are at 16, 24, 36, 56 batches of 4 a shard.
+fn aiming(half_width: f64, receivers: &str, max_batches: u64) -> Plan {
+    let stop = format!(
+        "[stop]\nrelative_half_width = {half_width}\nreceivers = {receivers}\nshare = 0.9\n\
+         max_batches = {max_batches}\n[[camera]]"
+    );
+    plan_of(&JOB.replace("batches = 10\n", "").replacen("[[camera]]", &stop, 1)).unwrap()
+}
+
+/// The shards `shards`, each complete.
+fn whole(shards: Range<u64>) -> Vec<(u64, u64)> {
+    shards.map(|k| (k, 4)).collect()
+}
+
+/// h of the lux-meter after the first `n` batches: its scores, and 0.5 lx that are the same in every batch.
+fn width_of_meter(plan: &Plan, n: u64) -> f64 {
+    let set = plan.sets().len() - 1;
+    let estimate = Estimate::from_scores((0..n).map(|i| scores(plan, i).sets[set].value[0]));
+    student_quantile(0.95, n) * estimate.standard_error / (estimate.mean + 0.5)
+}
+
+#[test]
+fn the_goal_ends_the_fold_at_the_first_look_that_reaches_it() {
+    let widths = [16, 24, 36].map(|n| width_of_meter(&plan(), n));
+    assert!(widths[0] > 1.05 * widths[1] && widths[1] > 1.05 * widths[2], "{widths:?}");
+    let plan = aiming(widths[1], r#"["meter"]"#, 60);
+    // Ten shards are done: four of them beyond the look that decides.
+    let (_temp, folders) = folders(&plan, &[&whole(0..10)]);
+    let result = merged(&folders);
+    assert_eq!(result.stopped, Some(Stopped::GoalReached { batches: 24 }));
+    assert_eq!((result.batches, result.missing.len(), result.seconds), (24, 0, 6.0 * 1.5));
+    let seen: Vec<_> = result.looks.iter().map(|l| (l.batches, l.relative_half_width, l.set.as_str())).collect();
+    assert_eq!(seen, [(16, widths[0], "meter"), (24, widths[1], "meter")]);
+    assert_eq!(goal_reached(&folders).unwrap(), Some(24));
+
+    // The same numbers as those of a job of 24 batches without a goal.
+    let fixed = plan_of(&JOB.replace("batches = 10", "batches = 24")).unwrap();
+    let (_temp, six) = self::folders(&fixed, &[&whole(0..6)]);
+    let straight = merged(&six);
+    assert_eq!((straight.stopped, straight.looks.len()), (None, 0));
+    assert!(result.sets == straight.sets && result.flux == straight.flux);
+}
+
+#[test]
+fn a_look_is_judged_only_with_every_shard_before_it() {
+    let plan = aiming(width_of_meter(&plan(), 24), r#"["meter"]"#, 40);
+    let see = |lists: &[&[(u64, u64)]]| {
+        let (_temp, folders) = folders(&plan, lists);
+        let m = merged(&folders);
+        let reached = matches!(m.stopped, Some(Stopped::GoalReached { .. }));
+        assert_eq!(goal_reached(&folders).unwrap().is_some(), reached);
+        (m.stopped, m.looks.len(), m.batches, m.missing)
+    };
+    let done = (Some(Stopped::GoalReached { batches: 24 }), 2, 24, Vec::new());
+    // In several folders, as copies, prefixes and with more than is needed.
+    assert_eq!(see(&[&[(0, 4), (3, 4), (4, 4)], &[(1, 4), (2, 4), (5, 4), (0, 2)], &[(7, 3)]]), done);
+    assert_eq!(see(&[&whole(0..10)]), done);
+    // One batch short of the look, whatever lies beyond.
+    let short = see(&[&whole(0..5), &[(5, 3)], &whole(6..9)]);
+    assert_eq!(short, (None, 1, 35, vec![23..24, 36..40]));
+    // Without an early shard no look can be judged, and what there is, is merged.
+    assert_eq!(see(&[&whole(1..9)]), (None, 0, 32, vec![0..4, 36..40]));
+    assert_eq!(see(&[&whole(0..2), &whole(3..9)]), (None, 0, 32, vec![8..12, 36..40]));
+}
+
+#[test]
+fn the_decision_reads_the_sets_of_the_goal_and_the_batches_before_the_look() {
+    let plan = aiming(width_of_meter(&plan(), 16), r#"["meter"]"#, 40);
+    let (_temp, folders) = folders(&plan, &[&whole(0..7)]);
+    let spoil = |shard: u64, at: fn(usize) -> usize| {
+        let path = folders[0].shard_path(shard);
+        let mut bytes = std::fs::read(&path).unwrap();
+        let at = at(bytes.len());
+        bytes[at] ^= 1;
+        std::fs::write(path, bytes).unwrap();
+    };
+    // Beyond the look; and before it in the moments of the floor, which fill the middle of the file.
+    spoil(6, |length| length - 1);
+    assert_eq!(merged(&folders).batches, 16);
+    spoil(1, |length| length / 2);
+    assert_eq!(goal_reached(&folders).unwrap(), Some(16));
+    assert!(refusal(&folders).contains("shard-000001.ckpt: refused: damaged: wrong checksum of Moments"));
+}
+
+#[test]
+fn the_limit_is_not_a_look() {
+    let at = |n: u64| width_of_meter(&plan(), n);
+    // 30 batches would do, but nobody looks there.
+    assert!(at(30) < 0.98 * at(24));
+    let (_temp, dirs) = folders(&aiming(0.99 * at(24), r#"["meter"]"#, 30), &[&whole(0..7), &[(7, 2)]]);
+    let limited = merged(&dirs);
+    assert_eq!((limited.stopped, limited.looks.len()), (Some(Stopped::Limit), 2));
+    assert_eq!((limited.batches, limited.missing.len()), (30, 0));
+    // A limit where a look falls is one.
+    let (_temp, dirs) = folders(&aiming(at(24), r#"["meter"]"#, 24), &[&whole(0..6)]);
+    assert_eq!(merged(&dirs).stopped, Some(Stopped::GoalReached { batches: 24 }));
+}
+
+#[test]
+fn every_set_by_itself_must_have_its_share() {
+    let (_temp, dirs) = folders(&aiming(1e-6, "[]", 16), &[&whole(0..4)]);
+    let (plan, result) = merge(&dirs).unwrap();
+    let quantile = student_quantile(0.95, 16);
+    let mut widest: (f64, &str) = (0.0, "");
+    let shapes = plan.sets();
+    for (shape, set) in shapes.iter().zip(&result.sets) {
+        let (random, fixed): (Vec<Estimate>, &Vec<f64>) = match set {
+            SetResult::Moments { bins, fixed_direct } => {
+                ((0..bins.len()).map(|i| bins.estimate(i, 16)).collect(), fixed_direct)
+            }
+            SetResult::Replicates { scores, fixed_direct } => {
+                ((0..shape.bins()).map(|i| scores.estimate(i)).collect(), fixed_direct)
+            }
+        };
+        let offset = fixed.first().copied().unwrap_or(0.0);
+        let mut widths: Vec<f64> = random.iter().map(|e| relative_half_width(e.shifted(offset), quantile)).collect();
+        widths.sort_by(f64::total_cmp);
+        let width = widths[(0.9 * widths.len() as f64).ceil() as usize - 1];
+        if width > widest.0 {
+            widest = (width, &shape.name);
+        }
+    }
+    let look = &result.looks[0];
+    assert_eq!((look.relative_half_width, look.set.as_str()), widest);
+    // The floor has more bins than a block: its share is taken over all of them.
+    assert!(shapes.iter().any(|s| s.bins() > BLOCK));
+}
+
+#[test]
+fn folders_with_other_goals_are_refused_unless_one_goes_on_longer() {
+    let (wide, tight) = (aiming(0.5, "[]", 40), aiming(0.001, "[]", 40));
+    let longer = aiming(0.001, "[]", 44);
+    let (_a, mut dirs) = folders(&wide, &[&whole(0..6)]);
+    let (_b, others) = folders(&tight, &[&whole(0..6)]);
+    let (_c, long) = folders(&longer, &[&whole(0..1)]);
+    dirs.extend(others);
+    for _ in 0..2 {
+        let reason = refusal(&dirs);
+        assert!(reason.contains("plan.toml: refused: another goal than in a folder before it"), "{reason}");
+        assert!(goal_reached(&dirs).is_err());
+        dirs.reverse();
+    }
+    dirs.extend(long);
+    for _ in 0..3 {
+        let (plan, result) = merge(&dirs).unwrap();
+        assert_eq!((plan.job.run.batches, result.stopped, result.looks.len()), (44, None, 2));
+        dirs.rotate_left(1);
+    }
 }

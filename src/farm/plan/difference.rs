@@ -27,14 +27,14 @@ impl Plan {
     }
 
     /// What forbids this plan to continue the work of `old`: the differences, and fewer batches. More batches
-    /// extend the work; confidence and checkpoint_seconds may change.
+    /// extend the work; confidence, checkpoint_seconds and the goal may change.
     pub fn obstacles(&self, old: &Plan) -> Vec<String> {
         let mut lines = self.differences(old);
         let (before, now) = (old.job.run.batches, self.job.run.batches);
         if now < before {
             lines.push(format!(
                 "{} (more batches extend the work, fewer are refused)",
-                line("run.batches", before, now)
+                line(self.job.batches_field(), before, now)
             ));
         }
         lines

@@ -6,6 +6,7 @@
 //! change.
 
 mod difference;
+pub mod looks;
 mod size;
 
 pub use size::{KEPT_LIMIT, MAX_SHARDS, Sizes, human};
@@ -18,7 +19,7 @@ use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
 /// Bumped whenever the numbers of any job change.
-pub const NUMERICS: u32 = 1;
+pub const NUMERICS: u32 = 2;
 
 /// An input file, known by its content.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -115,7 +116,8 @@ impl Plan {
     /// `bounds`.
     ///
     /// # Errors
-    /// [`crate::error::Error::Input`] where the plan would have too many shards or keep too many batch scores.
+    /// [`crate::error::Error::Input`] where the plan would have too many shards, keep too many batch scores, or
+    /// never be looked at.
     pub fn new(
         name: &str,
         job: Job,
@@ -130,6 +132,7 @@ impl Plan {
         let mut plan = Plan { program, numerics: NUMERICS, name, digest, inputs, job_file, scene, bounds, job };
         plan.digest = plan.content_digest().to_hex().to_string();
         plan.check_sizes()?;
+        plan.check_looks()?;
         Ok(plan)
     }
 

@@ -4,7 +4,7 @@
 use super::Plan;
 use crate::error::{Error, Result};
 use crate::job::{Kept, ReceiverKind, SetShape};
-use crate::tally::FLUX_BINS;
+use crate::tally::{FLUX_BINS, LARGEST};
 
 /// Most memory that the batch scores kept by a whole job may take \[bytes\]: merging holds them all at once.
 pub const KEPT_LIMIT: u64 = 2 << 30;
@@ -25,6 +25,8 @@ const NUMBER: u64 = 8;
 const KEPT: u64 = 2 * NUMBER;
 /// The digest by which a checkpoint remembers a batch \[bytes\].
 const DIGEST: u64 = 16;
+/// Score, number, mean and three power sums that a monitored bin keeps of a batch \[bytes\].
+const WATCHED: u64 = 6 * NUMBER;
 
 /// What a plan needs, estimated \[bytes\].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,7 +49,7 @@ impl Plan {
         let of_shard = run.batches_per_shard.min(run.batches);
         let tally: u64 = sets.iter().map(|s| tally_bytes(s, of_shard)).fold(0, u64::saturating_add);
         let flux = kept_bytes(FLUX_BINS.len() as u64, of_shard).saturating_add(DIGEST * of_shard);
-        let scores: u64 = sets.iter().map(score_bytes).fold(0, u64::saturating_add);
+        let scores: u64 = sets.iter().map(|s| score_bytes(s, run.histories_per_batch)).fold(0, u64::saturating_add);
         let vertices = run.histories_per_batch.saturating_mul(VERTICES * VERTEX);
         let checkpoint = tally.saturating_add(flux);
         let worker = [PROCESS, self.scene.bytes, checkpoint, scores, vertices].into_iter().fold(0, u64::saturating_add);
@@ -56,9 +58,12 @@ impl Plan {
     }
 
     fn kept_bytes(&self) -> u64 {
-        let kept = self.sets().into_iter().filter(|s| s.kept == Kept::EveryBatch).map(|s| s.bins() as u64);
+        let sets = self.sets();
+        let kept = sets.iter().filter(|s| s.kept == Kept::EveryBatch).map(|s| s.bins() as u64);
         let bins = kept.sum::<u64>() + FLUX_BINS.len() as u64;
-        kept_bytes(bins, self.job.run.batches)
+        let batches = self.job.run.batches;
+        let monitors = sets.iter().map(|s| monitor_bytes(s, batches)).fold(0, u64::saturating_add);
+        kept_bytes(bins, batches).saturating_add(monitors)
     }
 
     /// Refuses a plan beyond the limits, naming the size and what would help.
@@ -87,7 +92,12 @@ impl Plan {
             }
             None => {
                 let value = format!("{} ({} of batch scores)", self.job.run.batches, human(kept));
-                Err(Error::input(file, "run.batches", value, format!("{limit}; take fewer batches of more histories")))
+                Err(Error::input(
+                    file,
+                    self.job.batches_field(),
+                    value,
+                    format!("{limit}; take fewer batches of more histories"),
+                ))
             }
         }
     }
@@ -97,18 +107,24 @@ fn kept_bytes(bins: u64, batches: u64) -> u64 {
     bins.saturating_mul(batches).saturating_mul(KEPT)
 }
 
-/// Tally of one set over a shard, with the direct light that is the same in every batch.
-fn tally_bytes(set: &SetShape, batches: u64) -> u64 {
-    let bins = set.bins() as u64;
-    let fixed = bins * NUMBER;
-    match set.kept {
-        Kept::Moments { colour } => fixed + bins * NUMBER * if colour { 8 } else { 5 },
-        Kept::EveryBatch => fixed.saturating_add(kept_bytes(bins, batches)),
-    }
+/// What the monitored bins of one set keep of `batches` batches.
+fn monitor_bytes(set: &SetShape, batches: u64) -> u64 {
+    let each = batches.saturating_mul(WATCHED).saturating_add(LARGEST as u64 * NUMBER);
+    each.saturating_mul(set.monitored.len() as u64)
 }
 
-/// Scores and receivers of one batch.
-fn score_bytes(set: &SetShape) -> u64 {
+/// Tally of one set over a shard, its monitored bins and the direct light that is the same in every batch.
+fn tally_bytes(set: &SetShape, batches: u64) -> u64 {
+    let bins = set.bins() as u64;
+    let kept = match set.kept {
+        Kept::Moments { colour } => bins * NUMBER * if colour { 9 } else { 6 },
+        Kept::EveryBatch => (3 * bins * NUMBER).saturating_add(kept_bytes(bins, batches)),
+    };
+    kept.saturating_add(monitor_bytes(set, batches))
+}
+
+/// Scores, receivers and single histories of one batch.
+fn score_bytes(set: &SetShape, histories: u64) -> u64 {
     let numbers = match set.kept {
         Kept::Moments { colour: true } => 7,
         Kept::Moments { colour: false } | Kept::EveryBatch => 4,
@@ -117,7 +133,8 @@ fn score_bytes(set: &SetShape) -> u64 {
         ReceiverKind::Camera | ReceiverKind::Gonio => RECEIVER,
         ReceiverKind::Grid | ReceiverKind::Point | ReceiverKind::Region => RECEIVER / 2,
     };
-    set.bins() as u64 * (numbers * NUMBER + placed)
+    let watched = histories.saturating_mul(NUMBER * set.monitored.len() as u64);
+    (set.bins() as u64 * (numbers * NUMBER + placed)).saturating_add(watched)
 }
 
 /// A size as people read it.

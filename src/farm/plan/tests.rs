@@ -120,7 +120,12 @@ fn kept_scores_and_shards_beyond_the_limits_are_refused() {
 fn sizes_cover_what_a_checkpoint_takes() {
     let sizes = plan().sizes();
     assert!(sizes.worker > sizes.checkpoint && sizes.checkpoints == 3 * sizes.checkpoint);
-    assert_eq!(sizes.kept, 10 * (4 + 1 + 5) * 16);
+    // Batch scores of four grid points, a lux-meter and the flux; the lux-meter is monitored.
+    assert_eq!(sizes.kept, 10 * (4 + 1 + 5) * 16 + 10 * 48 + 200 * 8);
+    let watched =
+        plan_of(&JOB.replace("columns = 65\n", "columns = 65\nmonitor = [[1, 2], [3, 4]]\n")).unwrap().sizes();
+    assert_eq!(watched.kept - sizes.kept, 2 * (10 * 48 + 200 * 8));
+    assert_eq!(watched.checkpoint - sizes.checkpoint, 2 * (4 * 48 + 200 * 8));
     assert_eq!(human(5 << 20), "5.0 MiB");
     assert_eq!(human(1000), "1000 B");
 }

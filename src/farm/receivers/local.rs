@@ -16,7 +16,7 @@ use crate::transport::receiver::Receiver;
 use std::ops::Range;
 
 /// Histories that share a continuation of each receiver: chosen by measured figure of merit (docs/benchmarks.md).
-const HISTORIES_OF_A_PATH: usize = 4;
+const HISTORIES_OF_A_PATH: usize = 2;
 
 /// Scores of the bins of one tile.
 pub struct TileScores(Vec<BinScore>);
@@ -55,17 +55,17 @@ impl ReceiverSet {
         let rule = Rule { bound: self.bound, channels, orders: orders.clone() };
         let all = histories.histories();
         let groups = if continued.is_empty() { 1 } else { (all / HISTORIES_OF_A_PATH).max(1) };
-        let mut continuing = vec![Colour::BLACK; bins.len()];
         for group in 0..groups {
             let range = group * all / groups..(group + 1) * all / groups;
-            let tiles = continue_all(scene, &mut continued, &rule, range.len(), &mut continuing);
+            let mut start = vec![Colour::BLACK; bins.len()];
+            let tiles = continue_all(scene, &mut continued, &rule, &mut start);
             let tiles: Vec<&Tile> = std::iter::once(&base).chain(&tiles).collect();
-            connect(scene, histories, range, &tiles, &rule, &mut connected);
+            connect(scene, histories, range, &tiles, &rule, &start, &mut connected);
         }
-        let scores = sensed.iter().zip(connected).zip(continuing).map(|((sensed, connected), continuing)| {
-            let indirect = (connected.sum + continuing) / self.histories as f64;
+        let scores = sensed.iter().zip(connected).map(|(sensed, connected)| {
+            let value = sensed.direct + connected.sum / self.histories as f64;
             let (direct, existed, peak) = (sensed.direct, sensed.existed, connected.peak);
-            BinScore { value: direct + indirect, direct, peak, existed, watched: connected.totals }
+            BinScore { value, direct, peak, existed, watched: connected.totals }
         });
         TileScores(scores.collect())
     }
@@ -87,15 +87,9 @@ impl ReceiverSet {
     }
 }
 
-/// Draws the next path of each of the `continued`: its points as tiles, one or more for each depth. Direct light at them, times
-/// the `histories` that the paths serve, is added to `continuing`.
-fn continue_all(
-    scene: &Scene,
-    continued: &mut [Continued],
-    rule: &Rule,
-    histories: usize,
-    continuing: &mut [Colour],
-) -> Vec<Tile> {
+/// Draws the next path of each of the `continued`: its points as tiles, one or more for each depth. Direct light at them is
+/// added to `start`, one entry an owner: every history that the path serves has it.
+fn continue_all(scene: &Scene, continued: &mut [Continued], rule: &Rule, start: &mut [Colour]) -> Vec<Tile> {
     let mut of_depth: Vec<Vec<Link>> = Vec::new();
     for Continued { owner, receiver, rng } in continued {
         let path = continue_from(scene, receiver, rule.bound, rng);
@@ -105,7 +99,7 @@ fn continue_all(
             }
             of_depth[k].push(Link { owner: *owner, receiver: point });
             if rule.orders.contains(&(k as u32 + 1)) {
-                continuing[*owner] += direct * histories as f64;
+                start[*owner] += direct;
             }
         }
     }

@@ -5,8 +5,13 @@
 //! without extent is computed once. How histories are turned into scores is in `local`.
 
 mod local;
+mod sight;
 
 pub use local::TileScores;
+pub use sight::CentreSight;
+
+mod crossing;
+mod reverse;
 
 use crate::error::{Error, Result};
 use crate::job::{Camera, Job, SetShape};
@@ -225,7 +230,8 @@ impl ReceiverSet {
     fn sense_meter(&self, scene: &Scene, meter: Option<&Receiver>, rng: &mut Generator) -> Sensed {
         let samples = emitter_samples(self.histories);
         let direct = meter.map_or(Colour::BLACK, |r| from_emitters(scene, r, samples, rng));
-        Sensed { direct, receiver: meter.copied(), existed: meter.is_some() }
+        // In a scene without reflection there is nothing to wait for beyond direct light.
+        Sensed { direct, receiver: meter.copied(), existed: meter.is_some() && scene.reflects() }
     }
 
     fn sense_film(&self, scene: &Scene, eye: &Eye, strata: u32, bin: usize, rng: &mut Generator) -> Sensed {

@@ -25,6 +25,8 @@ pub struct Baker<'a> {
     positions: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,
     surface_of: Vec<u32>,
+    /// Node of each triangle.
+    node_of: Vec<u32>,
     /// Triangles without area, which were dropped.
     dropped: usize,
     /// How many nodes show each mesh; 0 once room is claimed for all of them.
@@ -65,6 +67,7 @@ impl<'a> Baker<'a> {
             positions: Vec::new(),
             triangles: Vec::new(),
             surface_of: Vec::new(),
+            node_of: Vec::new(),
             dropped: 0,
             unclaimed,
             vertices_claimed: 0,
@@ -87,8 +90,7 @@ impl<'a> Baker<'a> {
             let surface = self.materials.surface(primitive.material, &format!("{path}.material"), &label, warnings)?;
             let vertices = self.vertices(primitive, &path, placed, times, &mut first_of)?;
             let corners = self.corners(primitive, &path, mode, vertices.1, times)?;
-            let mirrored = placed.world.determinant() < 0.0;
-            self.push(corners, vertices.0, mirrored, surface);
+            self.push(corners, vertices.0, placed, surface);
         }
         Ok(())
     }
@@ -101,6 +103,7 @@ impl<'a> Baker<'a> {
         model.positions = self.positions;
         model.triangles = self.triangles;
         model.surface_of = self.surface_of;
+        model.nodes.of_triangle = self.node_of;
         model.surfaces = self.materials.into_surfaces();
         drop_unused_vertices(model);
     }
@@ -191,15 +194,17 @@ impl<'a> Baker<'a> {
         })
     }
 
-    /// Adds triangles of `surface`, their vertices counted from `first`. A mirrored node turns their order round, so
-    /// that the front stays the front.
-    fn push(&mut self, corners: Vec<[u32; 3]>, first: u32, mirrored: bool, surface: u32) {
+    /// Adds triangles of `surface` at the node `placed`, their vertices counted from `first`. A mirrored node turns
+    /// their order round, so that the front stays the front.
+    fn push(&mut self, corners: Vec<[u32; 3]>, first: u32, placed: &Placed, surface: u32) {
+        let mirrored = placed.world.determinant() < 0.0;
         for [a, b, c] in corners {
             let triangle = if mirrored { [a, c, b] } else { [a, b, c] }.map(|corner| first + corner);
             let [p, q, r] = triangle.map(|corner| self.positions[corner as usize]);
             if (q - p).cross(r - p).length() > 0.0 {
                 self.triangles.push(triangle);
                 self.surface_of.push(surface);
+                self.node_of.push(placed.place);
             } else {
                 self.dropped += 1;
             }

@@ -66,6 +66,7 @@ pub fn load(name: &str, bytes: &[u8], fetch: &mut dyn FnMut(&str) -> Result<Vec<
         place(file, &document, placed, &mut baker, &mut model, &mut warnings)?;
     }
     baker.finish(&mut model, &mut warnings);
+    model.nodes.list = nodes.iter().map(Placed::entry).collect();
     model.warnings = warnings.into_list();
     Ok(model)
 }

@@ -7,6 +7,7 @@ use super::document::{Document, Node};
 use super::problem::File;
 use crate::error::Result;
 use crate::math::{DMat4, DQuat, DVec3};
+use crate::scene;
 
 /// How far a rotation may be from a unit quaternion: exporters write `f32`, some of them few digits.
 const QUATERNION_TOLERANCE: f64 = 1e-2;
@@ -20,6 +21,10 @@ pub struct Placed<'a> {
     pub index: usize,
     /// What the file says of it.
     pub node: &'a Node,
+    /// Its place in the walk.
+    pub place: u32,
+    /// The place of its parent.
+    pub parent: Option<u32>,
     /// From its coordinates to those of the world; every entry is finite.
     pub world: DMat4,
 }
@@ -31,6 +36,11 @@ impl Placed<'_> {
             Some(name) => format!("node `{name}`"),
             None => format!("nodes[{}]", self.index),
         }
+    }
+
+    /// What the scene remembers of the node.
+    pub fn entry(&self) -> scene::Node {
+        scene::Node { index: self.index, name: self.node.name.clone(), parent: self.parent }
     }
 
     /// Position of the node's origin \[m\].
@@ -65,18 +75,19 @@ pub fn walk<'a>(file: File, document: &'a Document) -> Result<Vec<Placed<'a>>> {
     let parents = parents(file, document)?;
     refuse_cycles(file, document, &parents)?;
     let mut placed = Vec::new();
-    let mut stack: Vec<(usize, DMat4)> = Vec::new();
+    let mut stack: Vec<(usize, Option<u32>, DMat4)> = Vec::new();
     for root in roots(file, document, &parents)? {
-        stack.push((root, DMat4::IDENTITY));
-        while let Some((index, parent)) = stack.pop() {
+        stack.push((root, None, DMat4::IDENTITY));
+        while let Some((index, parent, above)) = stack.pop() {
             let node = &document.nodes[index];
-            let world = parent * local(file, node, index)?;
+            let place = placed.len() as u32;
+            let world = above * local(file, node, index)?;
             if !world.is_finite() || to_world(&world, DVec3::ZERO).is_none() {
                 let allowed = format!("positions within {FARTHEST:e} m");
                 return Err(file.bad(format_args!("nodes[{index}]"), "a transform beyond all bounds", allowed));
             }
-            stack.extend(node.children.iter().rev().map(|&child| (child, world)));
-            placed.push(Placed { index, node, world });
+            stack.extend(node.children.iter().rev().map(|&child| (child, Some(place), world)));
+            placed.push(Placed { index, node, place, parent, world });
         }
     }
     Ok(placed)

@@ -1,13 +1,20 @@
-//! (seed, domain, receiver set, index) -> [`Generator`]: every draw is a function of these four.
+//! (seed, domain, receiver set, index) -> [`Generator`]: every draw is a function of these four, or of a quasi-random
+//! point ([`sobol`]) that is a function of seed, batch and place in the batch.
 //!
 //! A [`Stream`] is the 256-bit key of one domain of one job, hashed by BLAKE3. A generator of the stream is a
 //! `Pcg64` whose state and increment are four different bijections of the index under that key, so that no two
 //! indices share a state and no counter ever becomes a PCG stream number (physics: docs/method.md, "Random
 //! numbers"). Nothing about a generator is ever stored: a history is replayed from its index.
 
+pub mod sobol;
+
 use crate::math::{DVec2, DVec3, PI, sin_cos};
 use rand_core::Rng;
 use rand_pcg::Pcg64;
+use sobol::DIMENSIONS;
+
+/// Unit of the uniform numbers, 2^-53.
+const UNIT: f64 = 1.0 / (1u64 << 53) as f64;
 
 /// What a stream of random numbers is for; switching one use on never shifts another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,6 +30,8 @@ pub enum Domain {
     Continuation,
     /// Scrambling of the quasi-random set of a batch; the index is the batch.
     Scrambling,
+    /// Paths from the receivers of one receiver set; the index is `batch * bins + bin`.
+    Reverse,
 }
 
 impl Domain {
@@ -33,6 +42,7 @@ impl Domain {
             Domain::Pilot => "lampyris 1 pilot",
             Domain::Continuation => "lampyris 1 continuation",
             Domain::Scrambling => "lampyris 1 scrambling",
+            Domain::Reverse => "lampyris 1 reverse",
         }
     }
 }
@@ -59,7 +69,8 @@ impl Stream {
     /// The generator number `index` of this stream.
     pub fn generator(&self, index: u64) -> Generator {
         let word = |i: usize| u128::from(mix(mix(index ^ self.key[i]).wrapping_add(self.key[(i + 1) % 4])));
-        Generator { pcg: Pcg64::new(word(0) | word(1) << 64, word(2) | word(3) << 64) }
+        let pcg = Pcg64::new(word(0) | word(1) << 64, word(2) | word(3) << 64);
+        Generator { pcg, point: [0.0; DIMENSIONS], taken: DIMENSIONS }
     }
 }
 
@@ -70,16 +81,58 @@ fn mix(mut z: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// Numbered draws of one history or one bin of one batch.
+/// Numbered draws of one history or one bin of one batch: first the coordinates of its quasi-random point, if it has
+/// one, then the numbers of its Pcg64 from the first on.
+///
+/// The coordinates of the point of a history go, in this order, to
+///
+/// ```text
+/// choice of the source    1    (none with a single source; every emissive triangle is one)
+/// omni, spot, parallel    2    direction, or place in the beam
+/// emissive triangle       2+2  point, direction; 1 between them for the side, where both sides emit
+/// Lambert reflection      2    direction
+/// glossy reflection       1+2  part, direction; none for the direction of a mirror
+/// ```
+///
+/// so that they last for emission and three reflections from a single omni, two from an emissive triangle. Where one
+/// is left for a pair the pair takes it and a random number. Russian roulette takes none, see [`Generator::chance`]:
+/// whether it is played depends on the weight, and would shift all that follow.
 #[derive(Clone, Debug)]
 pub struct Generator {
     pcg: Pcg64,
+    point: [f64; DIMENSIONS],
+    /// Coordinates of `point` that have been taken; all of a generator that has no point.
+    taken: usize,
 }
 
 impl Generator {
+    /// The same generator with the coordinates of `point` in front.
+    pub fn after(self, point: [f64; DIMENSIONS]) -> Self {
+        Generator { point, taken: 0, ..self }
+    }
+
     /// Uniform in [0, 1), a multiple of 2^-53.
     pub fn uniform(&mut self) -> f64 {
-        (self.pcg.next_u64() >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
+        let Some(&coordinate) = self.point.get(self.taken) else {
+            return self.random();
+        };
+        self.taken += 1;
+        coordinate
+    }
+
+    /// True with the probability `p`; never takes a coordinate.
+    pub fn chance(&mut self, p: f64) -> bool {
+        self.random() < p
+    }
+
+    /// The next number of the Pcg64, uniform in [0, 1).
+    fn random(&mut self) -> f64 {
+        (self.word() >> 11) as f64 * UNIT
+    }
+
+    /// The next 64 bits of the Pcg64.
+    fn word(&mut self) -> u64 {
+        self.pcg.next_u64()
     }
 
     /// Uniform in the unit square.
@@ -95,10 +148,11 @@ impl Generator {
     }
 }
 
-/// Direction uniform over the sphere, from a point of the unit square.
+/// Direction uniform over the sphere, from a point of the unit square. The polar axis is +Y, the vertical of glTF:
+/// the first coordinate of a quasi-random point then tells floor from ceiling by itself.
 pub fn sphere(u: DVec2) -> DVec3 {
-    let z = 1.0 - 2.0 * u.x;
-    around_z(z, u.y)
+    let d = around_z(1.0 - 2.0 * u.x, u.y);
+    DVec3::new(d.y, d.z, d.x)
 }
 
 /// Direction of the hemisphere around +Z with density cosine/pi, from a point of the unit square.

@@ -1,0 +1,150 @@
+//! Regions: the pixels of a camera of which one number a batch is kept, their mean.
+//!
+//! ```text
+//! s_b(region) = (1/P) sum over the P pixels p of the region of s_b(p)         value and direct part alike
+//! ```
+//!
+//! A rectangle is given; the pixels of a node are those in whose centre the node, or one below it, is the first
+//! surface seen. They are found once, so a region is the same in every batch, and its scores are a fixed linear
+//! combination of the map's: they carry the correlation between its pixels, which the map's own errors do not. A pixel
+//! that sees nothing counts as it does in the map, 0. Pixels are summed in their order: the same bits always.
+
+use super::receivers::CentreSight;
+use crate::error::{Error, Result};
+use crate::job::{Job, Region};
+use crate::scene::{Nodes, Scene};
+use crate::tally::Scores;
+use std::ops::Range;
+
+/// Names that an error lists, at most.
+const MOST_NAMES: usize = 20;
+
+/// The regions of a job, in its order.
+pub struct Regions(Vec<Part>);
+
+/// The pixels of one region.
+struct Part {
+    /// Receiver set of the camera: cameras come first in a job's sets.
+    camera: usize,
+    /// Runs of pixels, in ascending order.
+    runs: Vec<Range<u32>>,
+    /// Their number, above 0.
+    count: f64,
+}
+
+/// The surface seen in the centre of each pixel of a camera.
+pub type Seen = Vec<Option<u32>>;
+
+impl Regions {
+    /// The regions of `job`, read from `file`, in `scene`; `look` follows the rays of a camera through the centres of
+    /// its pixels, and is asked only for cameras with a region by node.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a node that the scene has not or has twice, or a region without any pixel.
+    pub fn place(job: &Job, scene: &Scene, file: &str, look: impl Fn(&CentreSight) -> Seen) -> Result<Regions> {
+        let mut seen: Vec<Option<Seen>> = vec![None; job.cameras.len()];
+        let mut parts = Vec::with_capacity(job.regions.len());
+        for (i, region) in job.regions.iter().enumerate() {
+            let at = job.cameras.iter().position(|c| c.name == region.camera);
+            let at = at.expect("a region's camera was found when the job was read");
+            let camera = &job.cameras[at];
+            let runs = match (region.rectangle, &region.node) {
+                (None, Some(name)) => {
+                    let field = format!("region[{i}].node");
+                    let node = find(&scene.nodes, name).map_err(|allowed| Error::input(file, &field, name, allowed))?;
+                    let seen = seen[at].get_or_insert_with(|| look(&CentreSight::new(scene, camera)));
+                    let runs = runs_of(seen, &scene.nodes, node);
+                    if runs.is_empty() {
+                        return Err(Error::input(file, &field, name, unseen(region)));
+                    }
+                    runs
+                }
+                (rectangle, _) => rows(rectangle.expect("a region has a rectangle or a node"), camera.width),
+            };
+            let count = runs.iter().map(|run| run.len() as f64).sum();
+            parts.push(Part { camera: at, runs, count });
+        }
+        Ok(Regions(parts))
+    }
+
+    /// Refuses regions of `job`, read from `file`, that cannot be placed in `scene`.
+    ///
+    /// # Errors
+    /// [`Error::Input`] as [`Regions::place`].
+    pub fn check(job: &Job, scene: &Scene, file: &str) -> Result<()> {
+        let look = |sight: &CentreSight| (0..sight.pixels()).map(|pixel| sight.primitive(pixel)).collect();
+        Regions::place(job, scene, file, look).map(|_| ())
+    }
+
+    /// Number of regions.
+    pub fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    /// The scores of each region from those of the other sets in the same batch.
+    pub fn scores(&self, sets: &[Scores]) -> Vec<Scores> {
+        self.0.iter().map(|part| part.score(&sets[part.camera])).collect()
+    }
+}
+
+impl Part {
+    /// One bin: means of value and direct part over the pixels, and whether any of them saw a surface.
+    fn score(&self, map: &Scores) -> Scores {
+        let mean = |pixels: &[f64]| self.pixels().map(|p| pixels[p]).sum::<f64>() / self.count;
+        Scores {
+            value: vec![mean(&map.value)],
+            direct: vec![mean(&map.direct)],
+            peak: vec![0.0],
+            existed: vec![self.pixels().any(|p| map.existed[p])],
+            ..Scores::default()
+        }
+    }
+
+    fn pixels(&self) -> impl Iterator<Item = usize> + '_ {
+        self.runs.iter().cloned().flatten().map(|p| p as usize)
+    }
+}
+
+/// The only node called `name`; else what would be allowed.
+fn find(nodes: &Nodes, name: &str) -> std::result::Result<usize, String> {
+    match nodes.called(name)[..] {
+        [node] => Ok(node),
+        [first, second, ..] => {
+            let [a, b] = [first, second].map(|place| nodes.list[place].index);
+            Err(format!("the name of one node: nodes[{a}] and nodes[{b}] of the scene both have it"))
+        }
+        [] => Err(format!("a node of the scene with a surface: {}", some(&nodes.names_with_surface()))),
+    }
+}
+
+/// As many of `names` as a reader will read.
+fn some(names: &[&str]) -> String {
+    let shown = names[..names.len().min(MOST_NAMES)].join(", ");
+    if names.len() > MOST_NAMES { format!("{shown}, and {} more", names.len() - MOST_NAMES) } else { shown }
+}
+
+fn unseen(region: &Region) -> String {
+    format!("a node that is the first surface in the centre of at least one pixel of camera {}", region.camera)
+}
+
+/// Runs of pixels in whose centre `node`, or one below it, is seen.
+fn runs_of(seen: &Seen, nodes: &Nodes, node: usize) -> Vec<Range<u32>> {
+    let inside = nodes.at_or_below(node);
+    let mut runs: Vec<Range<u32>> = Vec::new();
+    for (pixel, primitive) in (0u32..).zip(seen) {
+        if !primitive.and_then(|p| nodes.of(p)).is_some_and(|node| inside[node]) {
+            continue;
+        }
+        match runs.last_mut() {
+            Some(run) if run.end == pixel => run.end += 1,
+            _ => runs.push(pixel..pixel + 1),
+        }
+    }
+    runs
+}
+
+/// The runs of a rectangle (first column, first row, columns, rows) in a picture of `width` columns.
+fn rows([column, row, columns, rows]: [u32; 4], width: u32) -> Vec<Range<u32>> {
+    let start = |row: u32| row * width + column;
+    (row..row + rows).map(|row| start(row)..start(row) + columns).collect()
+}

@@ -1,0 +1,176 @@
+//! What is said of several bins at once: mean, minimum and uniformity of a grid, "every point of this grid", the means
+//! of regions, ratios. Here batch scores meet [`crate::tally::derived`], which knows how such intervals are made; here
+//! are the words for how that was, and for why there is none.
+
+use super::values::{Bin, SetValues, Status};
+use crate::farm::merge::{Merged, SetResult};
+use crate::farm::plan::Plan;
+use crate::job::{ReceiverKind, SetShape};
+use crate::tally::derived::{Bounded, Family, Series, family_quantile, ratio};
+use crate::tally::statistics::{Estimate, student_quantile};
+use serde::Serialize;
+
+const MEAN: &str = "mean over the points in each batch, Student's interval over the batches";
+const MINIMUM: &str = "least lower and least upper end of intervals that hold for every point together (Bonferroni): \
+                       conservative; the value is biased low, because noise chooses the least";
+const UNIFORMITY: &str = "minimum over mean; least lower and least upper end of jackknife intervals of point over mean \
+                          that hold for every point together (Bonferroni): conservative";
+const REGION: &str = "mean over the pixels in each batch, Student's interval over the batches";
+const RATIO: &str = "ratio of the means over the same batches, delete-one jackknife";
+
+/// A number with its interval, how that was made, and why there is none.
+#[derive(Debug, Serialize)]
+pub(super) struct Quantity {
+    pub value: f64,
+    /// Absent where the interval is not symmetric.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub standard_error: Option<f64>,
+    pub ci_lower: f64,
+    pub ci_upper: f64,
+    pub how: &'static str,
+    #[serde(skip_serializing_if = "str::is_empty")]
+    pub note: &'static str,
+}
+
+/// What is derived from one receiver set.
+#[derive(Debug, Default, Serialize)]
+pub(super) struct OfSet {
+    /// Of a region.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub interval: Option<Quantity>,
+    /// Of a grid whose batches are kept.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub derived: Option<OfGrid>,
+}
+
+/// What is derived from a grid.
+#[derive(Debug, Serialize)]
+pub(super) struct OfGrid {
+    /// Points with a receiver.
+    pub points: usize,
+    /// Standard errors by which an interval of one point lies about its value so that those of all points hold
+    /// together.
+    pub family_quantile: f64,
+    pub mean: Quantity,
+    pub min: Quantity,
+    /// Uo = minimum / mean \[1\].
+    pub uniformity: Quantity,
+}
+
+/// A `[[ratio]]` of the job \[1, or cd/m2 per lx\].
+#[derive(Debug, Serialize)]
+pub(super) struct OfRatio {
+    pub name: String,
+    pub numerator: String,
+    pub denominator: String,
+    #[serde(flatten)]
+    pub quantity: Quantity,
+}
+
+/// What is derived from the set number `set` of the job.
+pub(super) fn of_set(plan: &Plan, merged: &Merged, set: usize, shape: &SetShape) -> OfSet {
+    let SetResult::Replicates { scores, fixed_direct } = &merged.sets[set] else { return OfSet::default() };
+    let confidence = plan.job.run.confidence;
+    let family = Family::new(scores, fixed_direct);
+    match shape.kind {
+        ReceiverKind::Region => {
+            OfSet { interval: Some(Quantity::of_mean(&family.mean(), confidence, REGION)), derived: None }
+        }
+        ReceiverKind::Grid => OfSet { interval: None, derived: Some(OfGrid::new(&family, merged.batches, confidence)) },
+        ReceiverKind::Camera | ReceiverKind::Gonio | ReceiverKind::Point => OfSet::default(),
+    }
+}
+
+/// The ratios of the job, in its order.
+pub(super) fn ratios(plan: &Plan, merged: &Merged) -> Vec<OfRatio> {
+    let shapes = plan.job.sets();
+    let series = |name: &str| {
+        let place = shapes.iter().position(|s| s.name == name).expect("a ratio of a checked job is one of its sets");
+        match &merged.sets[place] {
+            SetResult::Replicates { scores, fixed_direct } => Family::new(scores, fixed_direct).mean(),
+            SetResult::Moments { .. } => unreachable!("a ratio of a checked job is one of sets that keep batches"),
+        }
+    };
+    let of_ratio = |r: &crate::job::Ratio| OfRatio {
+        name: r.name.clone(),
+        numerator: r.numerator.clone(),
+        denominator: r.denominator.clone(),
+        quantity: Quantity::of_ratio(&series(&r.numerator), &series(&r.denominator), plan.job.run.confidence),
+    };
+    plan.job.ratios.iter().map(of_ratio).collect()
+}
+
+/// Ends of the interval of `bin` that hold for every point of its grid together; `quantile` is that of the family.
+pub(super) fn family_interval(bin: &Bin, quantile: f64) -> [f64; 2] {
+    [bin.value - quantile * bin.standard_error, bin.value + quantile * bin.standard_error]
+}
+
+/// The quantile of the family of all points of `values` that have a receiver.
+pub(super) fn quantile_of(values: &SetValues, confidence: f64, batches: u64) -> f64 {
+    let points = values.bins.iter().filter(|b| b.status != Status::NoReceiver).count();
+    family_quantile(confidence, points, batches)
+}
+
+impl Quantity {
+    fn of_mean(series: &Series, confidence: f64, how: &'static str) -> Self {
+        let estimate = series.estimate();
+        Quantity::new(estimate, confidence, how, why_none(series))
+    }
+
+    fn of_ratio(numerator: &Series, denominator: &Series, confidence: f64) -> Self {
+        let estimate = ratio(numerator, denominator, confidence);
+        let note = [why_none(numerator), why_none(denominator), why_no_ratio(denominator, confidence)];
+        Quantity::new(estimate, confidence, RATIO, first(note))
+    }
+
+    fn new(estimate: Estimate, confidence: f64, how: &'static str, note: &'static str) -> Self {
+        let (ci_lower, ci_upper) = estimate.interval(student_quantile(confidence, estimate.n));
+        let standard_error = Some(estimate.standard_error);
+        Quantity { value: estimate.mean, standard_error, ci_lower, ci_upper, how, note }
+    }
+
+    fn of_least(least: Bounded, how: &'static str, note: &'static str) -> Self {
+        let missing = least.low.is_nan() && note.is_empty();
+        let note = if missing { "points without information" } else { note };
+        let Bounded { value, low, high } = least;
+        Quantity { value, standard_error: None, ci_lower: low, ci_upper: high, how, note }
+    }
+}
+
+impl OfGrid {
+    fn new(family: &Family, batches: u64, confidence: f64) -> Self {
+        let mean = family.mean();
+        let note = why_none(&mean);
+        let of_ratio = first([note, why_no_ratio(&mean, confidence)]);
+        OfGrid {
+            points: family.len(),
+            family_quantile: family_quantile(confidence, family.len(), batches),
+            mean: Quantity::of_mean(&mean, confidence, MEAN),
+            min: Quantity::of_least(family.minimum(confidence), MINIMUM, note),
+            uniformity: Quantity::of_least(family.uniformity(confidence), UNIFORMITY, of_ratio),
+        }
+    }
+}
+
+/// Why the mean of `series` has no interval; empty where it has one.
+fn why_none(series: &Series) -> &'static str {
+    if series.fixed.is_nan() {
+        "no receiver"
+    } else if series.scores.len() < 2 {
+        "an interval needs two batches"
+    } else if series.estimate().standard_error.is_nan() {
+        "no information"
+    } else {
+        ""
+    }
+}
+
+/// Why nothing can be divided by `denominator`; empty where it can.
+fn why_no_ratio(denominator: &Series, confidence: f64) -> &'static str {
+    if denominator.is_clear_of_zero(confidence) { "" } else { "the interval of the denominator contains zero" }
+}
+
+/// The first note that says something.
+fn first<const N: usize>(notes: [&'static str; N]) -> &'static str {
+    notes.into_iter().find(|note| !note.is_empty()).unwrap_or("")
+}

@@ -1,0 +1,70 @@
+//! Derived quantities for a terminal: a line for each grid, region and ratio.
+
+use super::derived::{OfGrid, OfRatio, Quantity};
+use super::number::{label, short};
+use super::summary::{SetSummary, Summary};
+
+/// Lines of one kind beyond this number are left to the files.
+const MOST: usize = 12;
+
+/// The lines of all that is derived, below a heading; none where there is nothing.
+pub(super) fn lines(summary: &Summary) -> Vec<String> {
+    let of_sets = |line: fn(&SetSummary) -> Option<String>| summary.sets.iter().filter_map(line).collect();
+    let grids = cut(of_sets(grid_line), "grids", "summary.json");
+    let regions = cut(of_sets(region_line), "regions", "regions.csv");
+    let ratios = cut(summary.ratios.iter().map(ratio_line).collect(), "ratios", "summary.json");
+    let lines: Vec<String> = [grids, regions, ratios].concat();
+    if lines.is_empty() {
+        return lines;
+    }
+    let heading = format!("  derived, intervals at {} %:", label(100.0 * summary.confidence));
+    std::iter::once(heading).chain(lines).collect()
+}
+
+fn cut(mut lines: Vec<String>, what: &str, file: &str) -> Vec<String> {
+    let all = lines.len();
+    if all > MOST {
+        lines.truncate(MOST);
+        lines.push(format!("    {} more {what}: see {file}", all - MOST));
+    }
+    lines
+}
+
+fn grid_line(set: &SetSummary) -> Option<String> {
+    let OfGrid { mean, min, uniformity, .. } = set.of_set.derived.as_ref()?;
+    let (mean, min, uo) = (about(mean, &format!(" {}", set.unit)), between(min), between(uniformity));
+    Some(format!("    {}: mean {mean}, min {min} {}, Uo {uo}", set.name, set.unit))
+}
+
+fn region_line(set: &SetSummary) -> Option<String> {
+    let mean = about(set.of_set.interval.as_ref()?, &format!(" {}", set.unit));
+    Some(format!("    {}: mean {mean}", set.name))
+}
+
+fn ratio_line(ratio: &OfRatio) -> String {
+    let OfRatio { name, numerator, denominator, quantity } = ratio;
+    format!("    {name}: {numerator} / {denominator} = {}", about(quantity, ""))
+}
+
+/// Value +- half the width of the interval; `unit` begins with a space, or is empty.
+fn about(q: &Quantity, unit: &str) -> String {
+    let half = 0.5 * (q.ci_upper - q.ci_lower);
+    if half.is_finite() {
+        format!("{} +- {}{unit}", short(q.value, 4), short(half, 2))
+    } else {
+        format!("{}{unit} ({})", short(q.value, 4), reason(q))
+    }
+}
+
+/// Value (from .. to).
+fn between(q: &Quantity) -> String {
+    if q.ci_lower.is_finite() && q.ci_upper.is_finite() {
+        format!("{} ({} .. {})", short(q.value, 4), short(q.ci_lower, 4), short(q.ci_upper, 4))
+    } else {
+        format!("{} ({})", short(q.value, 4), reason(q))
+    }
+}
+
+fn reason(q: &Quantity) -> String {
+    format!("no interval: {}", q.note)
+}

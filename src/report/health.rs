@@ -1,0 +1,169 @@
+//! The health of intervals as files and terminals show it: marks counted, monitored receivers one by one.
+//!
+//! What is marked and why is decided in `tally::health`; here are the words.
+
+use super::number::short;
+use super::summary::SetSummary;
+use super::values::{Bin, SetValues};
+use crate::farm::plan::Plan;
+use crate::job::{Estimator, Sampling};
+use crate::tally::Monitor;
+use crate::tally::health::checks::{CHECKS, Outcome, Snapshot, checks, snapshots};
+use crate::tally::health::tail::tail_slope;
+use crate::tally::health::{Health, Mark};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Monitored receivers beyond this number are left to `summary.json`.
+const MOST_LINES: usize = 12;
+
+/// What the single histories of one monitored bin say.
+pub(super) struct Examined {
+    /// Number of the bin in its set.
+    pub bin: u32,
+    /// Slope of the tail; None when too few histories are known.
+    pub slope: Option<f64>,
+    /// Largest total of a single history \[lx or cd/m2\]; NaN when none is known.
+    pub largest: f64,
+    /// In the order of [`CHECKS`].
+    pub checks: [Outcome; CHECKS.len()],
+    /// Through the second half of the run.
+    pub snapshots: Vec<Snapshot>,
+}
+
+impl Examined {
+    /// From `monitor`, with `fixed` the direct light that is the same in every batch.
+    pub fn new(monitor: &Monitor, fixed: f64, sampling: Sampling) -> Self {
+        let slope = tail_slope(&monitor.largest);
+        let snapshots = snapshots(monitor, fixed);
+        let checks = checks(&snapshots, slope, sampling);
+        let largest = monitor.largest.first().copied().unwrap_or(f64::NAN);
+        Examined { bin: monitor.bin, slope, largest, checks, snapshots }
+    }
+
+    /// How many of the first nine checks failed; the tenth has a mark of its own.
+    pub fn failed_checks(&self) -> usize {
+        self.checks[..CHECKS.len() - 1].iter().filter(|&&c| c == Outcome::Failed).count()
+    }
+
+    /// All numbers in a fixed order, for a digest.
+    pub fn numbers(&self) -> Vec<f64> {
+        let of = |s: &Snapshot| [s.mean, s.relative_error, s.vov, s.figure_of_merit_per_history];
+        let ends = [self.slope.unwrap_or(f64::NAN), self.largest];
+        ends.into_iter().chain(self.snapshots.iter().flat_map(of)).collect()
+    }
+}
+
+/// A monitored receiver in `summary.json`.
+#[derive(Debug, Serialize)]
+pub(super) struct Monitored {
+    pub set: String,
+    pub column: u32,
+    pub row: u32,
+    /// Marks of its interval; empty when healthy.
+    pub marks: Vec<&'static str>,
+    /// Slope of the tail of single histories; above 3 the variance is finite.
+    pub slope: Option<f64>,
+    /// Largest total of a single history.
+    pub largest: f64,
+    /// Variance of the variance of all single histories; for diagnosis only.
+    pub vov: f64,
+    pub checks: BTreeMap<&'static str, Outcome>,
+    pub snapshots: Vec<Snapshot>,
+    #[serde(skip)]
+    alone: bool,
+}
+
+impl Monitored {
+    /// The monitored receivers of one set, those that do not exist left out.
+    pub fn all(values: &SetValues) -> impl Iterator<Item = Monitored> + '_ {
+        let existing = |e: &&Examined| values.bins[e.bin as usize].health.is_some();
+        values.monitored.iter().filter(existing).map(|e| Monitored::new(values, e))
+    }
+
+    fn new(values: &SetValues, examined: &Examined) -> Self {
+        let (shape, bin) = (&values.shape, examined.bin);
+        let health = values.bins[bin as usize].health.unwrap_or_default();
+        Monitored {
+            set: shape.name.clone(),
+            column: bin % shape.width,
+            row: bin / shape.width,
+            marks: health.marks().map(Mark::word).collect(),
+            slope: examined.slope,
+            largest: examined.largest,
+            vov: examined.snapshots.last().map_or(f64::NAN, |s| s.vov),
+            checks: CHECKS.into_iter().zip(examined.checks).collect(),
+            snapshots: examined.snapshots.clone(),
+            alone: shape.bins() == 1,
+        }
+    }
+
+    /// True when its own interval has marks; that batches are few is said of all at once.
+    fn is_suspicious(&self) -> bool {
+        self.marks.iter().any(|&word| word != Mark::FewBatches.word())
+    }
+
+    fn line(&self) -> String {
+        let place = if self.alone { String::new() } else { format!(" [{}, {}]", self.column, self.row) };
+        let slope = self.slope.map_or(String::new(), |s| format!("; slope of the tail {}", short(s, 3)));
+        let failed: Vec<&str> = CHECKS.into_iter().filter(|c| self.checks[c] == Outcome::Failed).collect();
+        let checks = if failed.is_empty() { String::new() } else { format!("; failed: {}", failed.join(", ")) };
+        format!("{}{place}: its interval should not be trusted ({}{slope}{checks})", self.set, self.marks.join(", "))
+    }
+}
+
+/// Of `bins` how many have each mark, by its word with underscores.
+pub(super) fn count_marks(bins: &[Bin]) -> BTreeMap<String, usize> {
+    let count = |mark: Mark| bins.iter().filter(|b| b.health.is_some_and(|h| h.has(mark))).count();
+    Mark::ALL.into_iter().map(|mark| (key(mark), count(mark))).collect()
+}
+
+/// How many of `bins` have any mark.
+pub(super) fn count_unhealthy(bins: &[Bin]) -> usize {
+    bins.iter().filter(|b| b.health.is_some_and(|h: Health| !h.is_healthy())).count()
+}
+
+/// A line for each set with intervals that should not be trusted, the points together, and one for each such
+/// monitored receiver.
+pub(super) fn lines(sets: &[SetSummary], monitored: &[Monitored]) -> Vec<String> {
+    let (points, others): (Vec<&SetSummary>, Vec<&SetSummary>) = sets.iter().partition(|s| s.kind == "point");
+    let mut lines: Vec<String> = others.iter().filter_map(|s| line(&s.name, &[s])).collect();
+    lines.extend(line("points", &points));
+    let suspicious: Vec<&Monitored> = monitored.iter().filter(|m| m.is_suspicious()).collect();
+    lines.extend(suspicious.iter().take(MOST_LINES).map(|m| m.line()));
+    if suspicious.len() > MOST_LINES {
+        let more = suspicious.len() - MOST_LINES;
+        lines.push(format!("{more} more monitored receivers should not be trusted: see summary.json"));
+    }
+    lines
+}
+
+/// The line for `sets` together, None when nothing is marked.
+fn line(name: &str, sets: &[&SetSummary]) -> Option<String> {
+    let unhealthy: usize = sets.iter().map(|s| s.unhealthy).sum();
+    let bins: usize = sets.iter().map(|s| s.bins - s.inside).sum();
+    let count = |mark: Mark| sets.iter().filter_map(|s| s.marks.get(&key(mark))).sum::<usize>();
+    let counts = Mark::ALL.into_iter().map(|mark| (count(mark), mark.word()));
+    let why: Vec<String> = counts.filter(|(n, _)| *n > 0).map(|(n, word)| format!("{n} {word}")).collect();
+    (unhealthy > 0)
+        .then(|| format!("{name}: {unhealthy} of {bins} intervals should not be trusted ({})", why.join(", ")))
+}
+
+fn key(mark: Mark) -> String {
+    mark.word().replace(' ', "_")
+}
+
+/// True when the intervals are those of the plain local estimate.
+pub(super) fn is_plain(plan: &Plan) -> bool {
+    plan.job.transport.estimator == Estimator::Local && !plan.job.transport.bounded
+}
+
+/// What kind of estimate the numbers of `plan` are.
+pub(super) fn estimate_label(plan: &Plan) -> &'static str {
+    match plan.job.transport.estimator {
+        Estimator::Local if plan.job.transport.bounded => "bounded",
+        Estimator::Local => "plain local estimate: intervals near edges do not hold",
+        Estimator::Reverse => "reverse",
+        Estimator::DirectSimulation => "direct simulation",
+    }
+}

@@ -1,0 +1,65 @@
+//! The nodes of a scene file: what they are called, which hangs below which, which triangle belongs to which.
+//!
+//! A part of a scene is known to its user by the name of a node; it is everything that hangs at that node or below.
+//! Four bytes a triangle and the names are all that is kept of the hierarchy once transforms are baked in.
+
+/// A node of the scene.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Node {
+    /// Its number in the file.
+    pub index: usize,
+    /// Its name, where it has one; nothing forbids two nodes of one name.
+    pub name: Option<String>,
+    /// The node that it hangs at, as a place in [`Nodes::list`] before its own.
+    pub parent: Option<u32>,
+}
+
+/// All nodes, and the node of each triangle.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Nodes {
+    /// Parents before children.
+    pub list: Vec<Node>,
+    /// Of each triangle its node, a place in `list`; empty for a model that knows no nodes.
+    pub of_triangle: Vec<u32>,
+}
+
+impl Nodes {
+    /// Places of the nodes called `name`.
+    pub fn called(&self, name: &str) -> Vec<usize> {
+        let called = |node: &Node| node.name.as_deref() == Some(name);
+        (0..self.list.len()).filter(|&place| called(&self.list[place])).collect()
+    }
+
+    /// The node of the surface `primitive`; `None` for what comes from no scene file.
+    pub fn of(&self, primitive: u32) -> Option<usize> {
+        self.of_triangle.get(primitive as usize).map(|&place| place as usize)
+    }
+
+    /// Of each node whether it is the one at `place` or hangs below it.
+    pub fn at_or_below(&self, place: usize) -> Vec<bool> {
+        let mut below = vec![false; self.list.len()];
+        for (i, node) in self.list.iter().enumerate() {
+            below[i] = i == place || node.parent.is_some_and(|parent| below[parent as usize]);
+        }
+        below
+    }
+
+    /// Names of the nodes at which, or below which, there are triangles.
+    pub fn names_with_surface(&self) -> Vec<&str> {
+        let mut shown = vec![false; self.list.len()];
+        self.of_triangle.iter().for_each(|&place| shown[place as usize] = true);
+        for (i, node) in self.list.iter().enumerate().rev() {
+            if let (true, Some(parent)) = (shown[i], node.parent) {
+                shown[parent as usize] = true;
+            }
+        }
+        let named = self.list.iter().zip(shown).filter(|(_, shown)| *shown);
+        named.filter_map(|(node, _)| node.name.as_deref()).collect()
+    }
+
+    /// Memory \[bytes\].
+    pub fn bytes(&self) -> u64 {
+        let names: usize = self.list.iter().map(|n| size_of::<Node>() + n.name.as_ref().map_or(0, String::len)).sum();
+        (names + 4 * self.of_triangle.len()) as u64
+    }
+}
