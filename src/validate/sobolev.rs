@@ -50,7 +50,7 @@ pub(super) fn cases() -> Vec<Case> {
     vec![
         total("sobolev/A", "h 0.5 and 0.5, rho 0.5 and 0.5: E and L of both planes", 0, 4096),
         total("sobolev/B", "h 0.3 and 0.7, rho 0.9 and 0.8: E and L of both planes", 1, 4096),
-        total("sobolev/C", "h 0.7 and 0.3, rho 0.2 and 0.6: E and L of both planes", 2, 4096),
+        total("sobolev/C", "h 0.7 and 0.3, rho 0.2 and 0.6: E and L of both planes", 2, 16384),
         total("sobolev/D", "h 0.5 and 0.5, rho 0.9 and 0.8: E and L of both planes", 3, 4096),
         order("sobolev/orders-A", "each number of reflections by itself, plain estimate", 0),
         order("sobolev/orders-B", "each number of reflections by itself, plain estimate", 1),
