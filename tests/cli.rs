@@ -252,7 +252,7 @@ fn folders_without_a_plan_or_with_another_are_refused() {
 fn an_edited_or_damaged_plan_is_refused() {
     let edits = [
         ("seed = 1", "seed = 2", "edited or damaged: its digest is not that of its content"),
-        ("numerics = 1", "numerics = 9", "NUMERICS 9 of program"),
+        ("numerics = 2", "numerics = 9", "NUMERICS 9 of program"),
         ("batches = 4", "batches = 0", "run.batches = 0: 1 .."),
         ("seed = 1", "seed = ", "not a plan"),
         ("seed = 1", "seed = 1\nspeed = 1", "not a plan: unknown field `speed`"),
@@ -291,8 +291,10 @@ fn a_checkpoint_that_is_none_stops_everything_and_stays() {
 #[test]
 fn a_goal_fills_in_the_number_of_batches_of_the_plan() {
     let goal = |batches: &str| {
-        let stop = format!("{batches}batches_per_shard = 2\n[stop]\nrelative_half_width = 0.1\nmax_batches = 99\n");
-        folder_with(&JOB.replacen("batches = 4\nbatches_per_shard = 2\n", &stop, 1))
+        let stop = format!(
+            "{batches}batches_per_shard = 2\nsampling = \"random\"\n[stop]\nrelative_half_width = 0.1\nmax_batches = 99\n"
+        );
+        folder_with(&JOB.replacen("batches = 4\nbatches_per_shard = 2\nsampling = \"random\"\n", &stop, 1))
     };
     for typed in ["", "batches = 99\n"] {
         let folder = goal(typed);

@@ -335,7 +335,7 @@ fn any_number_of_threads_gives_the_same_bits() {
     let receivers = room_receivers() + &grid("g", [DVec3::new(1.0, 0.8, 3.0), DVec3::X, DVec3::NEG_Z, DVec3::Y], 5, 4);
     let only_grid = grid("g", [DVec3::new(1.0, 0.8, 3.0), DVec3::X, DVec3::NEG_Z, DVec3::Y], 5, 4);
     for (estimator, receivers) in [("local", &receivers), ("reverse", &receivers), ("direct_simulation", &only_grid)] {
-        let job = run(estimator, 192, 3) + &omni([2.5, 2.4, 1.6], 80.0) + receivers;
+        let job = run(estimator, 256, 16) + &omni([2.5, 2.4, 1.6], 80.0) + receivers;
         let digests = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| {

@@ -26,7 +26,7 @@ fn plan(half_width: f64, batches_per_shard: u64) -> Plan {
     );
     let scene = SceneSummary { triangles: 0, sources: 1, flux_lm: 1.0, bytes: 0, warnings: Vec::new() };
     let job = Job::parse(&text, "test.toml").unwrap();
-    Plan::new("test", job, Input::of("test.toml", text.as_bytes()), Vec::new(), scene, Vec::new()).unwrap()
+    Plan::new("test", job, Input::of("test.toml", text.as_bytes()), Vec::new(), scene).unwrap()
 }
 
 /// Mean of `histories` exponential scores of mean 1.

@@ -43,8 +43,9 @@ pub fn prepare(path: &Path) -> Result<Prepared> {
     summary.warnings.extend(lift_warning(&scene));
     summary.warnings.extend(ReceiverSet::check(&job, &scene, &file)?);
     Regions::check(&job, &scene, &file)?;
-    let bounds = bounds(&job, &scene);
-    let plan = Plan::new(&name, job, job_file.clone(), inputs, summary, bounds)?;
+    let plan = Plan::new(&name, job, job_file.clone(), inputs, summary)?;
+    let bounds = bounds(&plan.job, &scene);
+    let plan = plan.bounded(bounds);
     files.push((job_file, text.into_bytes()));
     Ok(Prepared { plan, files })
 }

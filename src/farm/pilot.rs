@@ -8,7 +8,7 @@
 
 use super::receivers::ReceiverSet;
 use crate::job::Job;
-use crate::math::{DVec3, PI};
+use crate::math::{DVec3, PI, ceil};
 use crate::photometry::Colour;
 use crate::random::{Domain, Stream};
 use crate::scene::Scene;
@@ -19,8 +19,8 @@ use crate::transport::trajectory::{Vertex, trace};
 const SCORE_OF_A_HISTORY: f64 = 3.0;
 /// Trajectories of a pilot.
 const TRAJECTORIES: u64 = 1024;
-/// Bins of a set at which a pilot estimates, at most.
-const SAMPLED_BINS: usize = 64;
+/// Bins of a set at which a pilot estimates.
+const SAMPLED_BINS: f64 = 64.0;
 /// Largest mean reflectance taken at its word: in a scene that absorbs nothing b would have no bound.
 const BRIGHTEST: f64 = 0.98;
 
@@ -33,11 +33,25 @@ pub fn bounds(job: &Job, scene: &Scene) -> Vec<f64> {
     if is_closed(job, scene) {
         return vec![bound_of_closed(scene); shapes.len()];
     }
-    let sets = ReceiverSet::all(job, scene, &[]);
+    let sets = ReceiverSet::all(&thinned(job), scene, &[]);
     let mut bounds: Vec<f64> = sets.iter().map(|set| bound_of_set(job, scene, set)).collect();
     // Regions are made of pixels, and have no connections of their own.
     bounds.resize(shapes.len(), f64::INFINITY);
     bounds
+}
+
+/// The job with about [`SAMPLED_BINS`] bins in each receiver set, spread over the same places.
+fn thinned(job: &Job) -> Job {
+    let mut thin = job.clone();
+    let cameras = thin.cameras.iter_mut().map(|c| (&mut c.width, &mut c.height));
+    let gonios = thin.gonios.iter_mut().map(|g| (&mut g.width, &mut g.height));
+    let grids = thin.grids.iter_mut().map(|g| (&mut g.columns, &mut g.rows));
+    for (width, height) in cameras.chain(gonios).chain(grids) {
+        let bins = f64::from(*width) * f64::from(*height);
+        let step = ceil((bins / SAMPLED_BINS).sqrt()) as u32;
+        (*width, *height) = (width.div_ceil(step), height.div_ceil(step));
+    }
+    thin
 }
 
 /// True when no trajectory of a pilot leaves the scene.
@@ -65,9 +79,7 @@ fn bound_of_set(job: &Job, scene: &Scene, set: &ReceiverSet) -> f64 {
     for i in 0..TRAJECTORIES {
         trace(scene, &job.transport, &mut stream.generator(i), &mut vertices);
     }
-    let bins = set.shape().bins();
-    let sampled = (0..bins).step_by(bins.div_ceil(SAMPLED_BINS));
-    let mut found: Vec<f64> = sampled
+    let mut found: Vec<f64> = (0..set.shape().bins())
         .filter_map(|bin| set.receiver(scene, bin))
         .map(|receiver| indirect(scene, &vertices, &receiver))
         .filter(|e| *e > 0.0)

@@ -55,7 +55,8 @@ pub fn plan_of(text: &str) -> Result<Plan> {
     let scene = SceneSummary { triangles: 0, sources: 1, flux_lm: 1.0, bytes: 0, warnings: Vec::new() };
     let job = Job::parse(text, "test.toml")?;
     let bounds = vec![1.0; if job.is_bounded() { job.sets().len() } else { 0 }];
-    Plan::new("test", job, Input::of("test.toml", text.as_bytes()), Vec::new(), scene, bounds)
+    let plan = Plan::new("test", job, Input::of("test.toml", text.as_bytes()), Vec::new(), scene)?;
+    Ok(plan.bounded(bounds))
 }
 
 /// The plan of [`JOB`].

@@ -112,28 +112,26 @@ impl Input {
 }
 
 impl Plan {
-    /// The plan of `job`, called `name`, over the scene described by `inputs` and `scene`, its kernel bounded by
-    /// `bounds`.
+    /// The plan of `job`, called `name`, over the scene described by `inputs` and `scene`, its kernel without bounds
+    /// yet.
     ///
     /// # Errors
     /// [`crate::error::Error::Input`] where the plan would have too many shards, keep too many batch scores, or
     /// never be looked at.
-    pub fn new(
-        name: &str,
-        job: Job,
-        job_file: Input,
-        inputs: Vec<Input>,
-        scene: SceneSummary,
-        bounds: Vec<f64>,
-    ) -> Result<Plan> {
+    pub fn new(name: &str, job: Job, job_file: Input, inputs: Vec<Input>, scene: SceneSummary) -> Result<Plan> {
         let program = env!("CARGO_PKG_VERSION").to_owned();
-        let digest = String::new();
-        let name = name.to_owned();
-        let mut plan = Plan { program, numerics: NUMERICS, name, digest, inputs, job_file, scene, bounds, job };
-        plan.digest = plan.content_digest().to_hex().to_string();
+        let (name, digest, bounds) = (name.to_owned(), String::new(), Vec::new());
+        let plan = Plan { program, numerics: NUMERICS, name, digest, inputs, job_file, scene, bounds, job };
         plan.check_sizes()?;
         plan.check_looks()?;
-        Ok(plan)
+        Ok(plan.bounded(Vec::new()))
+    }
+
+    /// The same plan with the kernel bounded by `bounds`, which are only looked for where the sizes are in order.
+    pub fn bounded(mut self, bounds: Vec<f64>) -> Plan {
+        self.bounds = bounds;
+        self.digest = self.content_digest().to_hex().to_string();
+        self
     }
 
     /// BLAKE3 of all that determines the content of a shard.
