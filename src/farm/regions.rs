@@ -8,6 +8,9 @@
 //! surface seen. They are found once, so a region is the same in every batch, and its scores are a fixed linear
 //! combination of the map's: they carry the correlation between its pixels, which the map's own errors do not. A pixel
 //! that sees nothing counts as it does in the map, 0. Pixels are summed in their order: the same bits always.
+//!
+//! What single histories give a region is not known, only what each gives a pixel at most. The largest of these, shared
+//! among the pixels of the region, is a lower bound of the region's peak; it is zero only where nothing is known.
 
 use super::receivers::CentreSight;
 use crate::error::{Error, Result};
@@ -88,13 +91,15 @@ impl Regions {
 }
 
 impl Part {
-    /// One bin: means of value and direct part over the pixels, and whether any of them saw a surface.
+    /// One bin: means of value and direct part over the pixels, a lower bound of the peak, and whether any of the
+    /// pixels saw a surface.
     fn score(&self, map: &Scores) -> Scores {
+        let peak = self.pixels().map(|p| map.peak[p]).fold(0.0, f64::max);
         let mean = |pixels: &[f64]| self.pixels().map(|p| pixels[p]).sum::<f64>() / self.count;
         Scores {
             value: vec![mean(&map.value)],
             direct: vec![mean(&map.direct)],
-            peak: vec![0.0],
+            peak: vec![peak / self.count],
             existed: vec![self.pixels().any(|p| map.existed[p])],
             ..Scores::default()
         }
