@@ -13,7 +13,7 @@ use lampyris::farm::realization::Realization;
 use lampyris::job::Job;
 use lampyris::scene::{Model, Scene, gltf};
 use lampyris::tally::derived::Family;
-use lampyris::tally::{BatchScores, Replicates};
+use lampyris::tally::{BatchScores, Replicates, SetTally, Tally};
 use serde_json::json;
 
 /// A floor of 2 x 2 m at height 0; at 0.5 m a table, of a top 0.75 m wide and 1.5 m deep and a shelf half as wide
@@ -122,6 +122,23 @@ fn a_region_of_the_whole_picture_is_the_mean_of_the_map() {
     let quadrature = estimates[0].iter().map(|e| e.standard_error * e.standard_error).sum::<f64>().sqrt() / 64.0;
     println!("error of the mean {:.2e}, in quadrature {quadrature:.2e}", estimates[1][0].standard_error);
     assert!(estimates[1][0].standard_error > 1.5 * quadrature);
+}
+
+#[test]
+fn the_tally_of_a_region_has_an_error_and_no_larger_peak_than_its_pixels() {
+    let whole = region("whole", "rectangle = [0, 0, 8, 8]");
+    let case = Case::new(&format!("{VIEW}{whole}"), model(&furnished()));
+    let (_, batches) = case.batches(1..u32::MAX);
+    let mut tally = Tally::new(&case.job.sets());
+    batches.iter().for_each(|b| tally.accumulate(b));
+    let SetTally::Replicates(region) = &tally.sets[1] else { panic!("regions keep their batches") };
+    let expected = common::estimates(&batches)[1][0];
+    assert_eq!(region.estimate(0), expected);
+    assert!(expected.standard_error > 0.0, "{expected:?}");
+    // One history gives the region at least what it gives one pixel, shared among all of them.
+    let largest = batches.iter().flat_map(|b| b.sets[0].peak.clone()).fold(0.0, f64::max);
+    assert!(largest > 0.0);
+    assert_eq!(region.peak, [largest / 64.0]);
 }
 
 #[test]

@@ -8,6 +8,9 @@
 //! surface seen. They are found once, so a region is the same in every batch, and its scores are a fixed linear
 //! combination of the map's: they carry the correlation between its pixels, which the map's own errors do not. A pixel
 //! that sees nothing counts as it does in the map, 0. Pixels are summed in their order: the same bits always.
+//!
+//! What single histories give a region is not known, only what each gives a pixel at most. The largest of these, shared
+//! among the pixels of the region, is a lower bound of the region's peak; it is zero only where nothing is known.
 
 use super::receivers::CentreSight;
 use crate::error::{Error, Result};

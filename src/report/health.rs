@@ -46,6 +46,11 @@ impl Examined {
         self.checks[..CHECKS.len() - 1].iter().filter(|&&c| c == Outcome::Failed).count()
     }
 
+    /// Variance of the variance of all single histories; NaN where it is not known.
+    pub fn vov(&self) -> f64 {
+        self.snapshots.last().map_or(f64::NAN, |s| s.vov)
+    }
+
     /// All numbers in a fixed order, for a digest.
     pub fn numbers(&self) -> Vec<f64> {
         let of = |s: &Snapshot| [s.mean, s.relative_error, s.vov, s.figure_of_merit_per_history];
@@ -91,7 +96,7 @@ impl Monitored {
             marks: health.marks().map(Mark::word).collect(),
             slope: examined.slope,
             largest: examined.largest,
-            vov: examined.snapshots.last().map_or(f64::NAN, |s| s.vov),
+            vov: examined.vov(),
             checks: CHECKS.into_iter().zip(examined.checks).collect(),
             snapshots: examined.snapshots.clone(),
             alone: shape.bins() == 1,

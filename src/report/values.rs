@@ -240,6 +240,7 @@ impl Rule {
             relative_error: bin.relative_error(),
             peak: bin.peak,
             vov: bin.vov,
+            history_vov: examined.map_or(f64::NAN, Examined::vov),
             slope: examined.and_then(|e| e.slope),
             failed_checks: examined.map_or(0, Examined::failed_checks),
         })

@@ -11,11 +11,18 @@
 //! | relative error | 4 | standard error over mean above [`RELATIVE_ERROR`] | all |
 //! | peak | 8 | one history gave more than [`PEAK`] of the sum of all | all |
 //! | vov | 16 | variance of the variance of the batch scores above [`VOV`], from [`VOV_BATCHES`] batches on | every batch kept |
-//! | tail | 32 | slope of the tail of single histories at most [`SLOPE`]: the variance may be infinite | monitored |
+//! | vov | 16 | variance of the variance of single histories above [`VOV`] | monitored |
+//! | tail | 32 | slope of the tail of single histories at most [`SLOPE`], and this tail matters: the variance may be infinite | monitored |
 //! | checks | 64 | [`FAILED_CHECKS`] or more of the first nine of the ten checks failed | monitored |
 //!
 //! A bin that is the same in every batch is known exactly and has no mark. One failed check is no mark: of healthy
 //! runs some percent fail one by chance (`checks`).
+//!
+//! **Single histories** tell more of the tail than batch scores, in quasi-random batches too: each point of a scrambled
+//! set has by itself the density of random sampling. Their VOV says nothing there about the error of the mean, but does
+//! say whether a few histories make up the variance. A slope is fitted to the shape of the largest totals whatever their
+//! size; where the VOV is below [`NEGLIGIBLE_VOV`] they make up so little of the variance that their slope is no matter.
+//! How often the marks are right is measured in docs/coverage.md.
 
 pub mod checks;
 pub mod tail;
@@ -27,13 +34,16 @@ pub const FEW_BATCHES: u64 = 16;
 pub const RELATIVE_ERROR: f64 = 0.1;
 /// Largest share of one history in the sum of all that is not marked \[1\].
 pub const PEAK: f64 = 0.05;
-/// Largest variance of the variance of batch scores that is not marked \[1\].
+/// Largest variance of the variance, of batch scores or of single histories, that is not marked \[1\].
 pub const VOV: f64 = 0.1;
 /// Batches from which on the variance of the variance of batch scores says something: of n normal scores it is
 /// about 2/n.
 pub const VOV_BATCHES: u64 = 50;
 /// Slope of a tail at and below which its variance is infinite.
 pub const SLOPE: f64 = 3.0;
+/// Variance of the variance of single histories up to which the slope of their tail is no matter \[1\]: where the
+/// variance is infinite it stays near 0.1 and above, however many they are.
+pub const NEGLIGIBLE_VOV: f64 = 0.02;
 /// Failed checks, of the first nine, that make a mark.
 pub const FAILED_CHECKS: usize = 3;
 
@@ -119,6 +129,8 @@ pub struct Signs {
     pub peak: f64,
     /// Variance of the variance of the batch scores \[1\].
     pub vov: f64,
+    /// Variance of the variance of single histories, of a monitored bin \[1\].
+    pub history_vov: f64,
     /// Slope of the tail, of a monitored bin.
     pub slope: Option<f64>,
     /// Number of the first nine checks that failed, of a monitored bin.
@@ -139,8 +151,8 @@ pub fn health(signs: &Signs) -> Health {
         Mark::FewBatches => signs.batches < FEW_BATCHES,
         Mark::RelativeError => signs.relative_error > RELATIVE_ERROR,
         Mark::Peak => signs.peak > PEAK,
-        Mark::Vov => signs.batches >= VOV_BATCHES && signs.vov > VOV,
-        Mark::Tail => signs.slope.is_some_and(|slope| slope <= SLOPE),
+        Mark::Vov => (signs.batches >= VOV_BATCHES && signs.vov > VOV) || signs.history_vov > VOV,
+        Mark::Tail => signs.slope.is_some_and(|slope| slope <= SLOPE) && signs.history_vov > NEGLIGIBLE_VOV,
         Mark::Checks => signs.failed_checks >= FAILED_CHECKS,
     };
     Health(Mark::ALL.into_iter().filter(|&mark| set(mark)).map(Mark::code).sum())

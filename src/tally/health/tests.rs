@@ -152,6 +152,7 @@ const HEALTHY: Signs = Signs {
     relative_error: 0.02,
     peak: 0.01,
     vov: 0.03,
+    history_vov: 0.03,
     slope: Some(STEEPEST),
     failed_checks: 1,
 };
@@ -165,7 +166,9 @@ fn each_sign_sets_its_own_mark() {
     assert_eq!(code(Signs { relative_error: 0.11, ..HEALTHY }), 4);
     assert_eq!(code(Signs { peak: 0.06, ..HEALTHY }), 8);
     assert_eq!(code(Signs { vov: 0.11, ..HEALTHY }), 16);
+    assert_eq!(code(Signs { history_vov: 0.11, batches: 16, ..HEALTHY }), 16);
     assert_eq!(code(Signs { slope: Some(2.5), ..HEALTHY }), 32);
+    assert_eq!(code(Signs { slope: Some(2.5), history_vov: 0.01, ..HEALTHY }), 0, "a tail that does not matter");
     assert_eq!(code(Signs { failed_checks: FAILED_CHECKS, ..HEALTHY }), 64);
     let worst = health(&Signs { batches: 4, relative_error: 0.5, peak: 0.5, slope: Some(2.0), ..HEALTHY });
     let words: Vec<&str> = worst.marks().map(Mark::word).collect();
@@ -175,7 +178,7 @@ fn each_sign_sets_its_own_mark() {
 #[test]
 fn what_is_not_known_sets_no_mark() {
     let nan = f64::NAN;
-    let unknown = Signs { relative_error: nan, peak: nan, vov: nan, slope: None, ..HEALTHY };
+    let unknown = Signs { relative_error: nan, peak: nan, vov: nan, history_vov: nan, slope: None, ..HEALTHY };
     assert!(health(&unknown).is_healthy());
     assert!(health(&Signs { vov: 0.5, batches: 49, ..HEALTHY }).is_healthy(), "VOV of few batches");
     assert!(health(&Signs { relative_error: 0.0, batches: 1, vov: nan, ..HEALTHY }).is_healthy(), "known exactly");
