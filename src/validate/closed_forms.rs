@@ -102,7 +102,7 @@ mod tests {
         same(flux, "isotropic_point_rect_flux", "I=100;h=1.5;rect 6x4 centred", "flux_lm");
         let degrees = PI / 180.0;
         let cone = 100.0 * spot_solid_angle(30.0 * degrees, 30.0 * degrees);
-        same(cone, "spot_uniform_cone_flux", "I=100;half angle 30 deg", "flux_lm");
+        same(cone, "spot_uniform_cone_flux", "I0=100;half angle 30 deg", "flux_lm");
     }
 
     #[test]
