@@ -15,7 +15,7 @@ use lampyris::tally::{BatchScores, Scores};
 fn run(estimator: &str, histories: u32, batches: u32) -> String {
     format!(
         "[run]\nhistories_per_batch = {histories}\nbatches = {batches}\nseed = 61\n\
-         [transport]\nbounded = false\nestimator = \"{estimator}\"\n"
+         [transport]\nestimator = \"{estimator}\"\n"
     )
 }
 

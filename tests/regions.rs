@@ -105,6 +105,11 @@ fn a_region_of_the_whole_picture_is_the_mean_of_the_map() {
         let map = &batch.sets[0];
         assert_eq!(batch.sets[1].value[0], map.value.iter().sum::<f64>() / 64.0);
         assert_eq!(batch.sets[1].direct[0], map.direct.iter().sum::<f64>() / 64.0);
+        // Above zero: a region that light reached is not without information.
+        assert!(
+            batch.sets[1].peak[0] > 0.0
+                && batch.sets[1].peak[0] == map.peak.iter().fold(0.0, |a: f64, &b| a.max(b)) / 64.0
+        );
         // What sees nothing counts as 0 in the rectangle and is not among the pixels of the room.
         let ratio = batch.sets[1].value[0] / batch.sets[2].value[0];
         assert!((ratio - *share.get_or_insert(ratio)).abs() < 0.05 && ratio < 0.9, "{ratio}");

@@ -55,7 +55,7 @@ impl Case {
     fn new(estimator: &str, histories: u64, receivers: &str) -> Case {
         let text = format!(
             "scene = \"room.glb\"\n[run]\nhistories_per_batch = {histories}\nbatches = {BATCHES}\n\
-             [transport]\nbounded = false\nestimator = \"{estimator}\"\n{receivers}"
+             [transport]\nestimator = \"{estimator}\"\n{receivers}"
         );
         let job = Job::parse(&text, "bench").expect("the job is right");
         let scene = Scene::new(room(), &job).expect("the scene is right");

@@ -170,6 +170,10 @@ fn check_plan(plan: &Plan, path: &Path) -> Result<()> {
     if plan.content_digest().to_hex().as_str() != plan.digest {
         return Err(Error::refused(path, "edited or damaged: its digest is not that of its content"));
     }
+    let bounds = if plan.job.is_bounded() { plan.sets().len() } else { 0 };
+    if plan.bounds.len() != bounds || !plan.bounds.iter().all(|b| *b > 0.0) {
+        return Err(Error::refused(path, "edited or damaged: the bounds are not one above zero for each receiver set"));
+    }
     // The fields outside the digest are checked as those of a job file are.
     if plan.name.chars().any(char::is_control) {
         return Err(Error::refused(path, "edited or damaged: the name of the job has control characters"));

@@ -7,7 +7,7 @@
 //! Any b gives an unbiased result; a good one gives a small variance. No score of the run is ever looked at.
 
 use super::receivers::ReceiverSet;
-use crate::job::{Estimator, Job};
+use crate::job::Job;
 use crate::math::{DVec3, PI};
 use crate::photometry::Colour;
 use crate::random::{Domain, Stream};
@@ -26,7 +26,7 @@ const BRIGHTEST: f64 = 0.98;
 
 /// b of each receiver set of `job`, in job order \[1/m2\]; empty where nothing is bounded.
 pub fn bounds(job: &Job, scene: &Scene) -> Vec<f64> {
-    if job.transport.estimator != Estimator::Local || !job.transport.bounded {
+    if !job.is_bounded() {
         return Vec::new();
     }
     let shapes = job.sets();

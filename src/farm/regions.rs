@@ -89,12 +89,16 @@ impl Regions {
 
 impl Part {
     /// One bin: means of value and direct part over the pixels, and whether any of them saw a surface.
+    ///
+    /// Its `peak` is the least that the largest total of a history can be, what the pixel with the largest one alone
+    /// gives: zero where no history reached any pixel, and only there.
     fn score(&self, map: &Scores) -> Scores {
         let mean = |pixels: &[f64]| self.pixels().map(|p| pixels[p]).sum::<f64>() / self.count;
+        let peak = self.pixels().map(|p| map.peak[p]).fold(0.0, f64::max) / self.count;
         Scores {
             value: vec![mean(&map.value)],
             direct: vec![mean(&map.direct)],
-            peak: vec![0.0],
+            peak: vec![peak],
             existed: vec![self.pixels().any(|p| map.existed[p])],
             ..Scores::default()
         }

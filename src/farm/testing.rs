@@ -54,7 +54,8 @@ intensity = 100.0
 pub fn plan_of(text: &str) -> Result<Plan> {
     let scene = SceneSummary { triangles: 0, sources: 1, flux_lm: 1.0, bytes: 0, warnings: Vec::new() };
     let job = Job::parse(text, "test.toml")?;
-    Plan::new("test", job, Input::of("test.toml", text.as_bytes()), Vec::new(), scene, Vec::new())
+    let bounds = vec![1.0; if job.is_bounded() { job.sets().len() } else { 0 }];
+    Plan::new("test", job, Input::of("test.toml", text.as_bytes()), Vec::new(), scene, bounds)
 }
 
 /// The plan of [`JOB`].

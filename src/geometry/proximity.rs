@@ -49,8 +49,13 @@ impl Sphere {
         let to_center = self.center - position;
         let distance = to_center.length() - self.radius;
         if distance.abs() <= NIL * (self.radius + to_center.length()) {
-            // On the sphere itself the factor to every other point of its inside is the same.
-            return normal.dot(to_center) > 0.0 && 4.0 * self.radius * self.radius * bound < 1.0;
+            if normal.dot(to_center) <= 0.0 {
+                return false;
+            }
+            // Seen along the radius the factor to every other point of the inside is the same; for a receiver that is
+            // tilted it grows without bound towards the rim of what lies above.
+            let tilted = normal.cross(to_center).length() > NIL * self.radius;
+            return tilted || 4.0 * self.radius * self.radius * bound < 1.0;
         }
         normal.dot(to_center) + self.radius > 0.0 && distance * distance * bound < 1.0
     }
@@ -63,9 +68,7 @@ impl Mesh {
         if self.is_empty() || position.cmplt(low - reach).any() || position.cmpgt(high + reach).any() {
             return false;
         }
-        // A little more than the reach: the box is rounded to f32.
-        let reach = DVec3::splat(reach * (1.0 + 1e-6) + floor);
-        let around = Aabb::new((position - reach).as_vec3a(), (position + reach).as_vec3a());
+        let around = half_ball(position + 0.5 * floor * normal, normal, reach + floor);
         let mut found = false;
         self.bvh.aabb_traverse(around, |bvh, node| {
             let node = &bvh.nodes[node as usize];
@@ -76,6 +79,16 @@ impl Mesh {
         });
         found
     }
+}
+
+/// A box around the points within `reach` of `position` that lie above the plane through it with `normal`. Half the height
+/// above which surfaces count is room enough for rounding to f32, and the surface on which a receiver stands, however
+/// finely divided, lies outside the box where it runs along two axes.
+fn half_ball(position: DVec3, normal: DVec3, reach: f64) -> Aabb {
+    // Along an axis at the angle a to the normal the half ball extends 1 forwards and sin a backwards.
+    let backwards = (DVec3::ONE - normal * normal).max(DVec3::ZERO).map(f64::sqrt);
+    let extent = |n: DVec3| DVec3::select(n.cmpgt(DVec3::ZERO), backwards, DVec3::ONE) * (reach * (1.0 + 1e-6));
+    Aabb::new((position - extent(normal)).as_vec3a(), (position + extent(-normal)).as_vec3a())
 }
 
 /// A number that no geometric factor between the origin with `normal` and the triangle exceeds \[1/m2\].
@@ -181,6 +194,8 @@ mod tests {
         assert!(ball.may_exceed(2.0 * DVec3::X, -DVec3::X, 0.99 * inside));
         assert!(!ball.may_exceed(2.0 * DVec3::X, -DVec3::X, 1.01 * inside));
         assert!(!ball.may_exceed(2.0 * DVec3::X, DVec3::X, 1e-6));
+        // A tilted receiver on the sphere: cos/(2 R d), without bound towards its rim.
+        assert!(ball.may_exceed(2.0 * DVec3::X, DVec3::new(-0.8, 0.6, 0.0), 1e6));
         assert!(ball.may_exceed(3.0 * DVec3::X, -DVec3::X, 0.9) && !ball.may_exceed(3.0 * DVec3::X, DVec3::X, 1e-6));
     }
 }

@@ -281,6 +281,11 @@ impl Job {
         Ok(job)
     }
 
+    /// True when the kernel of the local estimate is bounded.
+    pub fn is_bounded(&self) -> bool {
+        self.transport.estimator == Estimator::Local && self.transport.bounded
+    }
+
     /// The field that says how many batches the job has at most.
     pub fn batches_field(&self) -> &'static str {
         if self.stop.is_some() { "stop.max_batches" } else { "run.batches" }

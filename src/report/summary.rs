@@ -229,7 +229,7 @@ impl Flux {
         let met_delta_share = met_delta.mean / emitted.mean;
         Flux {
             difference: Term::new(difference, quantile),
-            met_delta_meaning: met_delta_meaning(met_delta_share),
+            met_delta_meaning: met_delta_meaning(emitted.mean, met_delta_share),
             met_delta_share,
             emitted,
             absorbed,
@@ -249,8 +249,10 @@ fn place(name: &str) -> usize {
     FLUX_BINS.iter().position(|&n| n == name).expect("a name of FLUX_BINS")
 }
 
-fn met_delta_meaning(share: f64) -> String {
-    if share > 0.0 {
+fn met_delta_meaning(emitted: f64, share: f64) -> String {
+    if emitted == 0.0 {
+        "no trajectory left a source: paths from the receivers keep no flux balance".to_owned()
+    } else if share > 0.0 {
         format!(
             "{:.3} % of the emitted flux met a mirror: light whose last surface before a receiver is a mirror is \
              missing from these results (emission seen in a mirror by an eye is not)",

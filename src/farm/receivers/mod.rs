@@ -213,9 +213,17 @@ impl ReceiverSet {
         film
     }
 
-    /// Where bin `bin` looks in its first batch, if anything reflects there.
+    /// A receiver such as bin `bin` has in a batch, if anything reflects there; without direct light, which costs more.
     pub fn receiver(&self, scene: &Scene, bin: usize) -> Option<Receiver> {
-        self.sense(scene, bin, 0).receiver
+        match &self.bins {
+            Bins::Meters(meters) => meters[bin],
+            Bins::Film { eye, strata } => {
+                let mut rng = self.stream.generator(bin as u64);
+                let stratum = rng.below(strata * strata);
+                let film = self.draw(eye, *strata, stratum, bin, &mut rng);
+                gaze(scene, eye, film, &mut rng).receiver
+            }
+        }
     }
 
     /// Direct light and receiver of one bin in one batch.
