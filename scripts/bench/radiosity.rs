@@ -20,6 +20,7 @@ use lampyris::math::{PI, exp, log};
 use lampyris::random::{Domain, Stream};
 use lampyris::scene::{Model, Scene};
 use lampyris::transport::trajectory::{Vertex, trace};
+use lampyris::validate::reference;
 use libm::j0;
 use nix::time::{ClockId, clock_gettime};
 use std::time::Duration;
@@ -101,10 +102,8 @@ fn exact() -> Vec<f64> {
         })
         .collect();
     let at = |r: f64| direct(r * r) + nodes.iter().map(|&(k, weight)| weight * j0(k * r)).sum::<f64>();
-    let table = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/reference/sobolev_tables.csv");
-    let mut rows = csv::Reader::from_path(table).expect("the table ships with the project");
-    for row in rows.records().map(|row| row.expect("a row")).filter(|row| &row[0] == "A") {
-        let [r, e1]: [f64; 2] = [5, 6].map(|i| row[i].parse().expect("a number"));
+    for row in reference::rows(reference::SOBOLEV).iter().filter(|row| row["case"] == "A") {
+        let [r, e1] = ["r", "E1"].map(|column| reference::number(row, column));
         assert!(r > 3.0 || (at(r) / e1 - 1.0).abs() < 1e-9, "r = {r}: {} against {e1}", at(r));
     }
     points().map(at).collect()
