@@ -12,8 +12,8 @@ use std::process::Command;
 /// NUMERICS, digest of the plan, digest of the results of `tests/exactness/job.toml`.
 const GOLDEN: (u32, &str, &str) = (
     1,
-    "ca3118f346ceab17c8e59fb83724fe550f032682130f6947d938fe5f0798079b",
-    "354b880724167eb4c02c1629984056fbdd90c7ede121fb3eb50548d23966b31a",
+    "a88b7698802ac24db252a092dcc8655b4755f467ee5181f6fcc22047de7a38c3",
+    "626a6d89a83abfa2fd303326ad986acdceb9023b231dee28075a84c893708a07",
 );
 
 #[test]
