@@ -167,7 +167,7 @@ fn bad_values_in_a_job_are_named_with_field_value_and_range() {
         ),
         ("[run]", "[stop]\nrelative_half_width = 0.1\nmax_batches = 4\nshare = 1.1\n[run]", "stop.share = 1.1: above"),
         (
-            "batches = 4\nbatches_per_shard = 2",
+            "batches = 4\nbatches_per_shard = 2\nsampling = \"random\"",
             "batches_per_shard = 2\n[stop]\nrelative_half_width = 0.1\nmax_batches = 99\nreceivers = [\"dask\"]",
             "stop.receivers[0] = dask: one of view, eye, floor, desk",
         ),

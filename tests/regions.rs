@@ -52,7 +52,8 @@ fn model(builder: &Builder) -> Model {
 const VIEW: &str = r#"
 [run]
 histories_per_batch = 32
-batches = 8
+batches = 16
+sampling = "random"
 [[camera]]
 name = "view"
 eye = [0, 2, 0]

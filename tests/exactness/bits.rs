@@ -54,7 +54,7 @@ pub fn summary(dir: &Path) -> Value {
 }
 
 /// Bits of the samples of every channel of a map.
-fn read_map(dir: &Path, map: &str) -> Vec<(String, Vec<u32>)> {
+pub fn read_map(dir: &Path, map: &str) -> Vec<(String, Vec<u32>)> {
     let image = read_all_flat_layers_from_file(dir.join(format!("{map}.exr"))).unwrap();
     assert_eq!(image.layer_data.len(), 1);
     let bits = |samples: &FlatSamples| match samples {

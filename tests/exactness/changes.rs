@@ -39,7 +39,7 @@ fn a_changed_job_or_scene_is_refused_naming_what_differs() {
     let (place, dir) = finished();
     let edits = [
         ("seed = 20", "seed = 21", "run.seed: 20 in the plan, 21 now"),
-        ("width = 40", "width = 41", "camera[0].width: 40 in the plan, 41 now"),
+        ("width = 24", "width = 25", "camera[0].width: 24 in the plan, 25 now"),
         ("histories_per_batch = 8", "histories_per_batch = 9", "run.histories_per_batch: 8 in the plan, 9 now"),
         ("sampling = \"random\"", "sampling = \"rqmc\"", "run.sampling: \"random\" in the plan, \"rqmc\" now"),
         ("batches_per_shard = 5", "batches_per_shard = 6", "run.batches_per_shard: 5 in the plan, 6 now"),

@@ -17,4 +17,5 @@ mod process;
 mod refusals;
 mod signals;
 mod stopping;
+mod variants;
 mod workers;

@@ -155,7 +155,7 @@ fn an_edited_plan_is_refused() {
     let text = fs::read_to_string(&path).unwrap();
     for (from, to, fragment) in [
         ("seed = 20", "seed = 21", "edited or damaged: its digest is not that of its content"),
-        ("width = 40", "width = 80", "edited or damaged: its digest is not that of its content"),
+        ("width = 24", "width = 80", "edited or damaged: its digest is not that of its content"),
         ("numerics = ", "numerics = 9", "NUMERICS 9"),
         ("batches = 28", "batches = 0", "run.batches = 0: 1 .. "),
         ("[job.run]", "[job.run", "not a plan"),

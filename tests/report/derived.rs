@@ -39,6 +39,7 @@ fn with_regions(n: u64) -> (Plan, Merged) {
     }
     result.sets.push(SetResult::Replicates { scores: left, fixed_direct: Vec::new() });
     result.sets.push(SetResult::Replicates { scores: lamp, fixed_direct: Vec::new() });
+    result.monitors.resize(result.sets.len(), Vec::new());
     (plan(&format!("{JOB}{PARTS}")), result)
 }
 

@@ -1,0 +1,243 @@
+//! Every option of a job is as exact as the defaults: estimators, ways of sampling, bounds of a closed and of an open
+//! scene, polished and peaked surfaces, channels. One small job, changed line by line.
+
+use crate::bits::{read_map, summary};
+use crate::place::{Place, plan_in};
+use crate::process::{expect, lampyris, run_quietly, work};
+use lampyris::scene::gltf;
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+const JOB: &str = include_str!("variants.toml");
+const SHARDS: u64 = 4;
+
+/// An infinite plane below the room: it has nothing to do with the light in it, but makes the scene an open one.
+const OPEN: &str = "[[plane]]\npoint = [0.0, -3.0, 0.0]\nnormal = [0.0, 1.0, 0.0]\nreflectance = 0.3\n[[camera]]\n";
+const RANDOM: (&str, &str) = ("seed = 23", "seed = 23\nsampling = \"random\"");
+const RGB: (&str, &str) = ("seed = 23", "seed = 23\nchannels = \"rgb\"");
+const OF_OPEN: (&str, &str) = ("[[camera]]\n", OPEN);
+const PLAIN: (&str, &str) = ("bounded = true", "bounded = false");
+const REVERSE: (&str, &str) = ("bounded = true", "estimator = \"reverse\"");
+
+/// Without any peak: then a flag says which receivers are continued.
+const DULL: (&str, &str) = ("room.glb", "dull.glb");
+
+/// Name and changes.
+type Variant = (&'static str, &'static [(&'static str, &'static str)]);
+
+const VARIANTS: [Variant; 7] = [
+    ("closed", &[]),
+    ("random-rgb", &[RANDOM, RGB]),
+    ("open", &[OF_OPEN, DULL]),
+    ("open-random-rgb", &[OF_OPEN, RANDOM, RGB]),
+    ("plain", &[PLAIN]),
+    ("reverse-rgb", &[REVERSE, RGB]),
+    ("peaked", &[("room.glb", "peaked.glb")]),
+];
+
+/// A place with the scenes of all variants.
+fn place() -> Place {
+    let place = Place::new();
+    let scene = fs::read(place.path("room.glb")).unwrap();
+    for (name, digit) in [("dull.glb", b'9'), ("peaked.glb", b'1')] {
+        fs::write(place.path(name), polished(scene.clone(), digit)).unwrap();
+    }
+    place
+}
+
+/// The same scene with another roughness, 0.`digit`, of all materials that are not matt.
+fn polished(mut scene: Vec<u8>, digit: u8) -> Vec<u8> {
+    let key = b"\"roughnessFactor\":0.";
+    let places = scene.windows(key.len()).enumerate().filter(|(_, w)| w == key).map(|(i, _)| i + key.len());
+    let places: Vec<usize> = places.collect();
+    assert!(!places.is_empty());
+    for at in places {
+        let digits = scene[at..].iter().take_while(|b| b.is_ascii_digit()).count();
+        scene[at..at + digits].fill(b'0');
+        scene[at] = digit;
+    }
+    scene
+}
+
+fn job_of(place: &Place, name: &str, changes: &[(&str, &str)]) -> PathBuf {
+    let change = |text: String, (from, to): &(&str, &str)| {
+        assert!(text.contains(from), "{from}");
+        text.replacen(from, to, 1)
+    };
+    let path = place.path(&format!("{name}.toml"));
+    fs::write(&path, changes.iter().fold(JOB.to_owned(), change)).unwrap();
+    path
+}
+
+/// All decoded results of a folder: digest of the summary, samples of the maps, text of the tables.
+#[derive(Debug, PartialEq)]
+struct Results {
+    digest: String,
+    maps: BTreeMap<String, Vec<u32>>,
+    tables: BTreeMap<String, String>,
+}
+
+fn results(dir: &Path) -> Results {
+    let names = fs::read_dir(dir).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap());
+    let (mut maps, mut tables) = (BTreeMap::new(), BTreeMap::new());
+    for name in names {
+        match name.rsplit_once('.') {
+            Some((map, "exr")) => maps.extend(read_map(dir, map)),
+            Some((table, "csv")) => drop(tables.insert(table.to_owned(), fs::read_to_string(dir.join(&name)).unwrap())),
+            _ => {}
+        }
+    }
+    assert!(!tables.is_empty());
+    Results { digest: summary(dir)["results_digest"].as_str().unwrap().to_owned(), maps, tables }
+}
+
+fn run(job: &Path, dir: &Path, workers: usize) -> Results {
+    expect(0, &mut run_quietly(job, dir, workers));
+    results(dir)
+}
+
+/// One worker; three workers; workers killed after a checkpoint of every shard and resumed by two threads, in another
+/// order; a run extended from 16 batches, which end inside a shard; two folders merged: the same results.
+fn assert_exact(name: &str, changes: &[(&str, &str)]) {
+    let place = place();
+    let job = job_of(&place, name, changes);
+    let straight = run(&job, &place.path("straight"), 1);
+    assert_eq!(straight, run(&job, &place.path("three"), 3), "{name}: workers");
+    let dir = place.plan(&job, "killed");
+    for shard in (0..SHARDS).rev() {
+        let fault = format!("after-rename:{}", 1 + shard % 2);
+        work(&dir, shard).env("LAMPYRIS_FAULT", fault).output().unwrap();
+        expect(0, lampyris(&["work", "--threads", "2", "--shard", &shard.to_string()]).arg(&dir));
+    }
+    expect(0, lampyris(&["merge"]).arg(&dir));
+    assert_eq!(straight, results(&dir), "{name}: kills and threads");
+    let dir = place.path("extended");
+    run(&job_of(&place, name, &[changes, &[("batches = 18", "batches = 16")]].concat()), &dir, 2);
+    let job = job_of(&place, name, changes);
+    assert_eq!(straight, run(&job, &dir, 2), "{name}: extension");
+    let [a, b] = ["a", "b"].map(|part| place.plan(&job, part));
+    for (dir, shards) in [(&a, [3, 0]), (&b, [1, 2])] {
+        shards.into_iter().for_each(|shard| drop(expect(0, &mut work(dir, shard))));
+    }
+    for (i, folders) in [[&a, &b], [&b, &a]].into_iter().enumerate() {
+        let out = place.path(&format!("merged-{i}"));
+        expect(0, lampyris(&["merge"]).args(folders).arg("-o").arg(&out));
+        assert_eq!(straight, results(&out), "{name}: merged");
+    }
+}
+
+#[test]
+fn every_variant_is_exact() {
+    for (name, changes) in VARIANTS {
+        assert_exact(name, changes);
+    }
+}
+
+#[test]
+fn direct_simulation_is_exact() {
+    let grid = JOB.find("[[grid]]").unwrap()..JOB.find("[[point]]").unwrap();
+    let receivers = &JOB[JOB.find("[[camera]]").unwrap()..];
+    let counted = ("bounded = true", "estimator = \"direct_simulation\"");
+    assert_exact("direct-simulation", &[(receivers, &JOB[grid]), counted]);
+}
+
+#[test]
+fn variants_are_what_they_are_called() {
+    let place = place();
+    let bounds = |(name, changes): &Variant| plan_in(&place.plan(&job_of(&place, name, changes), name)).bounds;
+    let [closed, _, open, _, plain, reverse, _] = VARIANTS.each_ref().map(bounds);
+    assert!(closed.len() == 5 && closed.iter().all(|b| *b == closed[0]), "{closed:?}");
+    // Each set has a bound of its own; the region, the last of them, is made of pixels.
+    assert!(open.len() == 5 && open[..4].iter().all(|b| b.is_finite()) && open[0] != open[2], "{open:?}");
+    assert!(plain.is_empty() && reverse.is_empty());
+    let peaked = |scene: &str| {
+        let bytes = fs::read(place.path(scene)).unwrap();
+        let model = gltf::load(scene, &bytes, &mut |_| unreachable!("all is in one file")).unwrap();
+        model.surfaces.iter().filter(|s| s.reflectance.is_peaked()).count()
+    };
+    // The steel of the room is peaked, floor, oak, lacquer, clay and apple become so.
+    assert_eq!(["dull.glb", "room.glb", "peaked.glb"].map(peaked), [0, 1, 6]);
+}
+
+#[test]
+fn a_plan_made_again_has_the_same_bounds_for_any_number_of_threads() {
+    let place = place();
+    let job = job_of(&place, "open", &[OF_OPEN]);
+    let text = |threads: &str| {
+        let dir = place.path(threads);
+        let mut plan = lampyris(&["plan"]);
+        expect(0, plan.env("RAYON_NUM_THREADS", threads).arg(&job).arg("-o").arg(&dir));
+        fs::read_to_string(dir.join("plan.toml")).unwrap()
+    };
+    let one = text("1");
+    assert!(one.contains("\nbounds = [0."), "{one}");
+    assert_eq!(one, text("2"));
+}
+
+#[test]
+fn edited_bounds_are_refused() {
+    let place = place();
+    let dir = place.plan(&job_of(&place, "closed", &[]), "dir");
+    let path = dir.join("plan.toml");
+    let text = fs::read_to_string(&path).unwrap();
+    let start = text.find("bounds = [").unwrap();
+    let line = &text[start..start + text[start..].find('\n').unwrap()];
+    let first = &line["bounds = [".len()..line.find(',').unwrap()];
+    let of = |b: &str| line.replacen(first, b, 1);
+    for edited in ["bounds = []".to_owned(), of("1.0"), of("nan"), of("0.0"), of("-0.1"), of("inf")] {
+        fs::write(&path, text.replace(line, &edited)).unwrap();
+        for command in [&mut work(&dir, 0), lampyris(&["merge"]).arg(&dir), lampyris(&["status"]).arg(&dir)] {
+            let said = expect(2, command);
+            assert!(said.contains("plan.toml: refused: edited or damaged"), "{edited}: {said}");
+        }
+    }
+}
+
+/// Sets that are added before, between and behind those of the job.
+const MORE: &str = r#"[[camera]]
+name = "close"
+node = "camera_detail"
+width = 6
+height = 4
+[[grid]]
+name = "shelf"
+origin = [1.0, 1.0, -1.0]
+u = [1.0, 0.0, 0.0]
+v = [0.0, 1.0, 0.0]
+normal = [0.0, 0.0, 1.0]
+columns = 3
+rows = 2
+[[region]]
+name = "corner"
+camera = "close"
+rectangle = [0, 0, 2, 2]
+"#;
+
+#[test]
+fn other_receivers_change_neither_a_bound_nor_a_number() {
+    for (name, changes) in [VARIANTS[0], VARIANTS[2], VARIANTS[3]] {
+        let place = place();
+        let (alone, with) = (place.path("alone"), place.path("with"));
+        let before = run(&job_of(&place, name, changes), &alone, 1);
+        let more = format!("{MORE}[[camera]]\nname = \"view\"");
+        let after =
+            run(&job_of(&place, name, &[changes, &[("[[camera]]\nname = \"view\"", &more)]].concat()), &with, 1);
+        for (map, samples) in &before.maps {
+            assert!(*samples == after.maps[map], "{name}: {map}");
+        }
+        for table in ["floor", "points"] {
+            assert_eq!(before.tables[table], after.tables[table], "{name}");
+        }
+        let regions = &before.tables["regions"];
+        assert!(regions.lines().all(|line| after.tables["regions"].lines().any(|l| l == line)), "{name}: {regions}");
+        // By name, for they have other numbers now.
+        let bounds = |dir: &Path| -> BTreeMap<String, u64> {
+            let plan = plan_in(dir);
+            plan.sets().into_iter().map(|s| s.name).zip(plan.bounds.iter().map(|b| b.to_bits())).collect()
+        };
+        let (before, after) = (bounds(&alone), bounds(&with));
+        assert!(before.len() == 5 && after.len() == 8, "{before:?} {after:?}");
+        assert!(before.iter().all(|(set, b)| *b == after[set]), "{name}: {before:?} {after:?}");
+    }
+}
