@@ -196,5 +196,6 @@ fn bounded(b: Bounded) -> (Vec<(f64, f64, f64)>, f64) {
 fn plan(job: &Job) -> Plan {
     let scene = SceneSummary { triangles: 0, sources: 1, flux_lm: 1.0, bytes: 0, warnings: Vec::new() };
     let bounds = vec![f64::INFINITY; if job.transport.bounded { job.sets().len() } else { 0 }];
-    Plan::new("coverage", job.clone(), Input::of("job.toml", b""), Vec::new(), scene, bounds).expect("a job for a plan")
+    let plan = Plan::new("coverage", job.clone(), Input::of("job.toml", b""), Vec::new(), scene);
+    plan.expect("a job for a plan").bounded(bounds)
 }
