@@ -5,7 +5,7 @@
 //! falls with the batches alone.
 
 use super::cases::room;
-use super::count::is_marked;
+use super::count::{is_marked, square};
 use super::replicate::{Kind, Reading, Replicate};
 use lampyris::error::Result;
 use lampyris::math::log2;
@@ -108,8 +108,8 @@ impl Found {
         let of_size = |of_size: &Vec<Vec<Reading>>| {
             let ratio = |which: usize| {
                 let truth = Estimate::from_scores(last.iter().map(|r| r[which].intervals[0].0)).mean;
-                let observed: f64 = of_size.iter().map(|r| (r[which].intervals[0].0 - truth).powi(2)).sum();
-                let promised: f64 = of_size.iter().map(|r| r[which].standard_error.powi(2)).sum();
+                let observed: f64 = of_size.iter().map(|r| square(r[which].intervals[0].0 - truth)).sum();
+                let promised: f64 = of_size.iter().map(|r| square(r[which].standard_error)).sum();
                 observed / promised
             };
             format!("{:.2}", (0..METERS.len()).map(ratio).sum::<f64>() / METERS.len() as f64)
@@ -120,21 +120,21 @@ impl Found {
 }
 
 fn mean_variance(readings: &[Vec<Reading>], which: usize, truth: f64) -> Estimate {
-    Estimate::from_scores(readings.iter().map(|r| (r[which].standard_error / truth).powi(2)))
+    Estimate::from_scores(readings.iter().map(|r| square(r[which].standard_error / truth)))
 }
 
 /// Slope and intercept of the straight line of least squares.
 fn fit(points: &[(f64, f64)]) -> (f64, f64) {
     let n = points.len() as f64;
     let (mx, my) = (points.iter().map(|p| p.0).sum::<f64>() / n, points.iter().map(|p| p.1).sum::<f64>() / n);
-    let slope = points.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum::<f64>() / spread(points).powi(2);
+    let slope = points.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum::<f64>() / square(spread(points));
     (slope, my - slope * mx)
 }
 
 /// Root of the sum of the squared distances of x from its mean.
 fn spread(points: &[(f64, f64)]) -> f64 {
     let mean = points.iter().map(|p| p.0).sum::<f64>() / points.len() as f64;
-    points.iter().map(|p| (p.0 - mean).powi(2)).sum::<f64>().sqrt()
+    points.iter().map(|p| square(p.0 - mean)).sum::<f64>().sqrt()
 }
 
 /// How many of the runs are marked, and by what.

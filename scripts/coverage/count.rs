@@ -56,6 +56,10 @@ pub fn wilson(hits: usize, trials: usize) -> (f64, f64) {
     (middle - half, middle + half)
 }
 
+pub fn square(x: f64) -> f64 {
+    x * x
+}
+
 pub fn is_marked(signs: &[Signs]) -> bool {
     signs.iter().any(|s| !health(s).is_healthy())
 }
@@ -84,7 +88,7 @@ impl Counted {
     fn z(&self) -> f64 {
         let mean = self.mean();
         let truth_error = self.quantity.truth_error / self.quantity.truth[0];
-        (mean.mean - 1.0) / (mean.standard_error.powi(2) + truth_error.powi(2)).sqrt()
+        (mean.mean - 1.0) / (square(mean.standard_error) + square(truth_error)).sqrt()
     }
 
     /// Whether the coverage is what was promised.

@@ -195,7 +195,5 @@ fn bounded(b: Bounded) -> (Vec<(f64, f64, f64)>, f64) {
 /// The plan of a job in memory, for its goal and looks.
 fn plan(job: &Job) -> Plan {
     let scene = SceneSummary { triangles: 0, sources: 1, flux_lm: 1.0, bytes: 0, warnings: Vec::new() };
-    let bounds = vec![f64::INFINITY; if job.transport.bounded { job.sets().len() } else { 0 }];
-    let plan = Plan::new("coverage", job.clone(), Input::of("job.toml", b""), Vec::new(), scene);
-    plan.expect("a job for a plan").bounded(bounds)
+    Plan::new("coverage", job.clone(), Input::of("job.toml", b""), Vec::new(), scene).expect("a job for a plan")
 }
