@@ -4,7 +4,7 @@
 //! Case -> jobs and models -> Experiment (batches of a realization) -> Estimate beside reference -> Comparison -> verdict
 //! ```
 //!
-//! References are closed forms in code ([`closed_forms`]) where there is one, else tables ([`reference`]). This module
+//! References are closed forms in code ([`closed_forms`]) where there is one, else tables ([`mod@reference`]). This module
 //! does not know files, printing, nor why a case is asked for.
 
 mod bounces;
