@@ -175,6 +175,41 @@ fn a_peaked_floor_under_a_lamp_is_as_reverse_paths_find_it() {
 }
 
 #[test]
+fn the_image_of_a_lamp_in_a_narrow_lobe_is_told() {
+    let caustic = |roughness: f64, luminance: f64, source: &str| {
+        let job = run(64, 16) + source + &peaked_receivers();
+        let case = Case::new(&job, cube_with_peaked_floor(roughness, luminance));
+        let batches = case.batches(ALL).1;
+        let mean = |set: usize| Estimate::from_scores(batches.iter().map(|b| b.sets[set].caustic[0])).mean;
+        let reflected = indirect(&case, ALL);
+        [0, 1, 2].map(|set| mean(set) / reflected[set].mean)
+    };
+    let lamp = omni([0.5, 0.7, 0.5], 10.0);
+    for share in [caustic(0.05, 0.0, &lamp), caustic(0.1, 0.0, &lamp)] {
+        // The wall sees the floor, which the lamp lights straight; the floor sees itself over the walls only.
+        assert!((0.05..0.5).contains(&share[2]), "{share:?}");
+        assert!(share[..2].iter().all(|s| (0.0..share[2]).contains(s) && *s > 0.0), "{share:?}");
+    }
+    // Light that has an extent is found by the lobe, whatever its width.
+    assert_eq!(caustic(0.1, 20.0, ""), [0.0; 3]);
+}
+
+#[test]
+fn reverse_paths_tell_the_same_of_the_image_of_a_lamp() {
+    let model = cube_with_peaked_floor(0.1, 0.0);
+    let receivers = omni([0.5, 0.7, 0.5], 10.0) + &point("wall", [0.0, 0.1, 0.4], [1.0, 0.0, 0.0]);
+    // With nothing carried by connections the paths of both are the same, and so is the light at their points.
+    let job = |estimator: &str| run(2048, 64) + &receivers + &format!("[transport]\nestimator = \"{estimator}\"\n");
+    let told = |estimator: &str| {
+        let mut case = Case::new(&job(estimator), model.clone());
+        case.bound_all(1e-12);
+        let batches = case.batches(ALL).1;
+        Estimate::from_scores(batches.iter().map(|b| b.sets[0].caustic[0]))
+    };
+    assert_all(&differences("caustic", &[told("local")], &[told("reverse")]));
+}
+
+#[test]
 fn the_bound_takes_the_spikes_of_peaks_and_edges_away() {
     let job = run(256, 256) + &omni([0.5, 0.7, 0.5], 10.0) + &peaked_receivers() + &edge_pixel();
     let model = cube_with_peaked_floor(0.05, 0.0);

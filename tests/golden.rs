@@ -13,7 +13,7 @@ use std::process::Command;
 const GOLDEN: (u32, &str, &str) = (
     2,
     "96199aada1ef290ef545cd965b6c9288dc6fc6dec56e6e946d4e9585ed8964aa",
-    "626a6d89a83abfa2fd303326ad986acdceb9023b231dee28075a84c893708a07",
+    "aad491f205da6c47806a54b37344373386909824e3cd31978ab84165f1024c7d",
 );
 
 #[test]

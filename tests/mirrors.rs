@@ -7,7 +7,11 @@ use common::scenes::{add_quad, closed_box, lambert, point, spot_camera};
 use common::{Case, Estimate, assert_all, compare, flux};
 use lampyris::math::{DVec3, PI};
 use lampyris::photometry::Colour;
+use lampyris::random::{Domain, Stream};
 use lampyris::scene::{Model, Reflectance, Surface};
+use lampyris::transport::connection::Connectors;
+use lampyris::transport::receiver::{Receiver, Response};
+use lampyris::transport::trajectory::{Vertex, trace};
 
 fn mirror(base: f64) -> Surface {
     Surface { reflectance: Reflectance::metallic_roughness(Colour::grey(base), 1.0, 0.0), ..lambert(0.0, 0.0) }
@@ -69,6 +73,44 @@ fn trajectories_follow_a_mirror_like_its_image_source() {
     let met = flux(&batches, "met_delta").mean;
     assert!(met > 0.49 * 400.0 * PI && met < 400.0 * PI, "{met}");
     assert_all(&[compare("mirror against image source", difference, image.mean)]);
+}
+
+#[test]
+fn light_from_a_mirror_above_the_bound_is_told() {
+    // A mirror wall at x = 0 of a cube, and meters on the matt floor, in its middle and beside the matt wall x = 1.
+    let places = [0.5, 0.99, 0.9999].map(|x| [x, 0.0, 0.4]);
+    let meters = places.iter().enumerate().map(|(i, &p)| point(&format!("p{i}"), p, [0.0, 1.0, 0.0]));
+    let mut model = closed_box(DVec3::ONE, &lambert(0.5, 0.0));
+    model.surfaces[0] = mirror(0.9);
+    let job = "[run]\nbatches = 16\nhistories_per_batch = 256\n".to_owned()
+        + &omni([0.4, 0.6, 0.5])
+        + &meters.collect::<String>();
+    let case = Case::new(&job, model);
+    assert_eq!(case.scene.narrowest_lobe(), 0.0);
+    let batches = case.batches(0..u32::MAX).1;
+    let told = |set: usize| Estimate::from_scores(batches.iter().map(|b| b.sets[set].caustic[0])).mean;
+    assert_eq!(told(0), 0.0, "nothing above the bound in the middle");
+    assert!(batches.iter().all(|b| b.sets[2].caustic[0] > 0.0), "known from few histories, however near the wall");
+    let excess = mirrored_above_the_bound(&case, case.scene.place(places[1]));
+    assert!((0.5..2.0).contains(&(told(1) / excess)), "{} for {excess}", told(1));
+}
+
+/// What connections to a lux-meter on the floor bring of light that a mirror sent, less what the bound would let through.
+fn mirrored_above_the_bound(case: &Case, position: DVec3) -> f64 {
+    const HISTORIES: u64 = 1 << 18;
+    let stream = Stream::new(43, Domain::Trajectory, "");
+    let [mut carried, mut bounded] = [Connectors::default(), Connectors::default()];
+    for history in 0..HISTORIES {
+        let mut vertices: Vec<Vertex> = Vec::new();
+        trace(&case.scene, &case.job.transport, &mut stream.generator(history), &mut vertices);
+        vertices.retain(|v| v.after_delta);
+        carried.push(&case.scene, &vertices);
+        vertices.iter_mut().for_each(|v| v.after_delta = false);
+        bounded.push(&case.scene, &vertices);
+    }
+    let meter = Receiver { position, normal: DVec3::Y, response: Response::Cosine };
+    let sum = |histories| common::connect(&case.scene, histories, case.bounds[0], &[meter])[0].sum.luminance();
+    (sum(&carried) - sum(&bounded)) / HISTORIES as f64
 }
 
 #[test]

@@ -24,7 +24,8 @@ fn plan(half_width: f64, batches_per_shard: u64) -> Plan {
          max_batches = {LIMIT}\n[[point]]\nname = \"meter\"\nposition = [0, 0, 0]\nnormal = [0, 1, 0]\n\
          [[source]]\nkind = \"omni\"\nposition = [0, 1, 0]\nintensity = 1\n"
     );
-    let scene = SceneSummary { triangles: 0, sources: 1, flux_lm: 1.0, bytes: 0, warnings: Vec::new() };
+    let scene =
+        SceneSummary { triangles: 0, sources: 1, flux_lm: 1.0, bytes: 0, narrowest_lobe: 1.0, warnings: Vec::new() };
     let job = Job::parse(&text, "test.toml").unwrap();
     Plan::new("test", job, Input::of("test.toml", text.as_bytes()), Vec::new(), scene).unwrap()
 }

@@ -178,11 +178,12 @@ fn reflected_bias(size: f64) -> (f64, f64) {
 
 /// Memory of one bin of a map: number, mean, central sum of squares and what stands beside them.
 fn bin_bytes() -> f64 {
-    let MomentBlock { mean, m2, direct, peak, existed, colour: _ } = MomentBlock::new(1, false);
+    let MomentBlock { mean, m2, direct, peak, caustic, existed, colour: _ } = MomentBlock::new(1, false);
     (size_of_val(&mean[..])
         + size_of_val(&m2[..])
         + size_of_val(&direct[..])
         + size_of_val(&peak[..])
+        + size_of_val(&caustic[..])
         + size_of_val(&existed[..])) as f64
 }
 

@@ -27,7 +27,7 @@ const SOBOLEV_A_1: f64 = 0.653442317194389;
 /// All cases, printed as they come.
 pub fn run(replicates: u64, mut done: impl FnMut(&[Counted])) -> Result<Vec<Counted>> {
     type Case = fn(u64) -> Result<Vec<Counted>>;
-    let cases: [Case; 15] = [
+    let cases: [Case; 17] = [
         |n| sobolev_a("rqmc", n),
         |n| sobolev_a("random", n),
         ulbricht_sphere,
@@ -37,9 +37,11 @@ pub fn run(replicates: u64, mut done: impl FnMut(&[Counted])) -> Result<Vec<Coun
         |n| lamp_in_cube("random", 64, 32, false, n),
         furnace_grid,
         cornell,
-        |n| glossy_floor(0.1, Lamp::Ceiling, n),
-        |n| glossy_floor(0.1, Lamp::Point, n),
-        |n| glossy_floor(0.3, Lamp::Point, n),
+        |n| glossy_floor(0.1, Lamp::Ceiling, 32, n),
+        |n| glossy_floor(0.1, Lamp::Point, 32, n),
+        |n| glossy_floor(0.3, Lamp::Point, 32, n),
+        |n| glossy_floor(0.3, Lamp::Point, 128, n),
+        mirror_beside_an_edge,
         stopped_sobolev,
         |n| stopped_edge(true, n),
         |n| stopped_edge(false, n),
@@ -216,8 +218,8 @@ enum Lamp {
     Ceiling,
 }
 
-/// A cube with a glossy floor, seen in luminance at a slant.
-fn glossy_floor(roughness: f64, lamp: Lamp, n: u64) -> Result<Vec<Counted>> {
+/// A cube with a glossy floor, seen in luminance at a slant, in 32 batches of `histories`.
+fn glossy_floor(roughness: f64, lamp: Lamp, histories: u32, n: u64) -> Result<Vec<Counted>> {
     let mut model = closed_box(DVec3::ONE, &lambert(0.5, 0.0));
     // closed_box adds the floor, y = 0, as its third quad.
     model.surfaces[2] = Surface {
@@ -234,14 +236,40 @@ fn glossy_floor(roughness: f64, lamp: Lamp, n: u64) -> Result<Vec<Counted>> {
             (String::new(), "area light")
         }
     };
-    let job = tables("rqmc", 32, 32)
+    let job = tables("rqmc", 32, histories)
         + &source
         + &camera("floor", [0.9, 0.3, 0.5], [0.3, 0.0, 0.45], 10.0, [2, 1])
         + "[[region]]\nname = \"both\"\ncamera = \"floor\"\nrectangle = [0, 0, 2, 1]\n";
     let experiment = Experiment::new(&job, model)?;
     let wanted = [("L of a pixel", Kind::Total(0, 0)), ("region of 2 pixels", Kind::Total(1, 0))];
     let quantities = measured(&experiment, &wanted);
-    Ok(count(&format!("glossy floor, roughness {roughness}, {name}, rqmc"), &experiment, quantities, n))
+    Ok(count(
+        &format!("glossy floor, roughness {roughness}, {name}, rqmc, 32 x {histories}"),
+        &experiment,
+        quantities,
+        n,
+    ))
+}
+
+/// A cube with a mirror for a wall, and an edge that the mirror lights: that part of the light has no bound.
+fn mirror_beside_an_edge(n: u64) -> Result<Vec<Counted>> {
+    let mut model = closed_box(DVec3::ONE, &lambert(0.5, 0.0));
+    // closed_box adds the wall x = 0 as its first quad.
+    let reflectance = Reflectance::metallic_roughness(Colour::grey(0.9), 1.0, 0.0);
+    model.surfaces[0] = Surface { name: "mirror".into(), reflectance, ..lambert(0.0, 0.0) };
+    let job = tables("rqmc", 32, 32)
+        + &omni([0.4, 0.6, 0.5], 100.0)
+        + &camera("edge", [0.6, 0.5, 0.5], [1.0, 0.0, 0.5], 8.0, [1, 1])
+        + &point("near", [0.995, 0.0, 0.5], UP)
+        + &point("middle", [0.5, 0.0, 0.5], UP);
+    let experiment = Experiment::new(&job, model)?;
+    let wanted = [
+        ("E 5 mm from a wall", Kind::Total(1, 0)),
+        ("E in the middle", Kind::Total(2, 0)),
+        ("pixel across an edge", Kind::Total(0, 0)),
+    ];
+    let quantities = measured(&experiment, &wanted);
+    Ok(count("mirror beside an edge, rqmc", &experiment, quantities, n))
 }
 
 fn stop(relative_half_width: f64, sampling: &str) -> String {

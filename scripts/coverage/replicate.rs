@@ -12,7 +12,7 @@ use lampyris::tally::health::Signs;
 use lampyris::tally::health::checks::{Outcome, checks, snapshots};
 use lampyris::tally::health::tail::tail_slope;
 use lampyris::tally::statistics::{Estimate, student_quantile, variance_of_variance};
-use lampyris::tally::{Replicates, SetTally, Tally};
+use lampyris::tally::{Moments, Replicates, SetTally, Tally};
 use lampyris::validate::experiment::Experiment;
 
 /// What is read from a replicate.
@@ -74,6 +74,7 @@ pub struct Replicate {
     /// Scores less direct light, of the first bin of each set, batch by batch.
     indirect: Vec<Vec<f64>>,
     job: Job,
+    narrowest_lobe: f64,
 }
 
 impl Replicate {
@@ -91,7 +92,8 @@ impl Replicate {
         let shapes = job.sets();
         let indirect = vec![Vec::new(); shapes.len()];
         let fixed = realization.fixed_direct().to_vec();
-        let mut replicate = Replicate { tally: Tally::new(&shapes), fixed, indirect, job: job.clone() };
+        let narrowest_lobe = experiment.scene.narrowest_lobe();
+        let mut replicate = Replicate { tally: Tally::new(&shapes), fixed, indirect, job: job.clone(), narrowest_lobe };
         for index in 0..batches {
             let scores = realization.batch(index);
             for (indirect, set) in replicate.indirect.iter_mut().zip(&scores.sets) {
@@ -158,14 +160,18 @@ impl Replicate {
     /// What the marks of a bin follow from.
     fn signs(&self, set: usize, bin: usize) -> Signs {
         let batches = self.tally.batches();
-        let (random, direct, peak, vov) = match &self.tally.sets[set] {
-            SetTally::Moments(m) => (m.bins.estimate(bin, m.n), m.bins.direct[bin], m.bins.peak[bin], f64::NAN),
+        let (random, direct, [peak, caustic, vov]) = match &self.tally.sets[set] {
+            SetTally::Moments(Moments { n, bins }) => {
+                (bins.estimate(bin, *n), bins.direct[bin], [bins.peak[bin], bins.caustic[bin], f64::NAN])
+            }
             SetTally::Replicates(r) => {
-                (r.estimate(bin), r.direct_mean(bin), r.peak[bin], variance_of_variance(r.scores(bin)))
+                let vov = variance_of_variance(r.scores(bin));
+                (r.estimate(bin), r.direct_mean(bin), [r.peak[bin], r.caustic[bin], vov])
             }
         };
         let fixed = self.fixed[set].get(bin).copied().unwrap_or(0.0);
-        let sum = (random.mean - direct) * batches as f64 * self.job.run.histories_per_batch as f64;
+        let histories = batches as f64 * self.job.run.histories_per_batch as f64;
+        let sum = (random.mean - direct) * histories;
         let monitor = self.tally.monitors[set].iter().find(|m| m.bin as usize == bin);
         let slope = monitor.and_then(|m| tail_slope(&m.largest));
         let snapshots = monitor.map_or(Vec::new(), |m| snapshots(m, fixed));
@@ -179,6 +185,8 @@ impl Replicate {
             history_vov: snapshots.last().map_or(f64::NAN, |s| s.vov),
             slope,
             failed_checks: outcomes[..9].iter().filter(|&&o| o == Outcome::Failed).count(),
+            caustic: caustic / random.standard_error,
+            histories_in_lobe: histories * self.narrowest_lobe * self.narrowest_lobe,
         }
     }
 }
@@ -194,6 +202,7 @@ fn bounded(b: Bounded) -> (Vec<(f64, f64, f64)>, f64) {
 
 /// The plan of a job in memory, for its goal and looks.
 fn plan(job: &Job) -> Plan {
-    let scene = SceneSummary { triangles: 0, sources: 1, flux_lm: 1.0, bytes: 0, warnings: Vec::new() };
+    let (narrowest_lobe, warnings) = (1.0, Vec::new());
+    let scene = SceneSummary { triangles: 0, sources: 1, flux_lm: 1.0, bytes: 0, narrowest_lobe, warnings };
     Plan::new("coverage", job.clone(), Input::of("job.toml", b""), Vec::new(), scene).expect("a job for a plan")
 }

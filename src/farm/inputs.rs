@@ -112,6 +112,7 @@ fn summary(scene: &Scene) -> SceneSummary {
         sources: scene.sources.len() as u64,
         flux_lm: scene.sources.flux(),
         bytes: scene.bytes(),
+        narrowest_lobe: scene.narrowest_lobe(),
         warnings: scene.warnings.clone(),
     }
 }

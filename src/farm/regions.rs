@@ -91,7 +91,7 @@ impl Regions {
 }
 
 impl Part {
-    /// One bin: means of value and direct part over the pixels, and whether any of them saw a surface.
+    /// One bin: means of value, direct and caustic part over the pixels, and whether any of them saw a surface.
     ///
     /// Its `peak` is the least that the largest total of a history can be, what the pixel with the largest one alone
     /// gives: zero where no history reached any pixel, and only there.
@@ -102,6 +102,7 @@ impl Part {
             value: vec![mean(&map.value)],
             direct: vec![mean(&map.direct)],
             peak: vec![peak],
+            caustic: vec![mean(&map.caustic)],
             existed: vec![self.pixels().any(|p| map.existed[p])],
             ..Scores::default()
         }

@@ -52,7 +52,8 @@ intensity = 100.0
 
 /// The plan of the job `text` without a scene file.
 pub fn plan_of(text: &str) -> Result<Plan> {
-    let scene = SceneSummary { triangles: 0, sources: 1, flux_lm: 1.0, bytes: 0, warnings: Vec::new() };
+    let scene =
+        SceneSummary { triangles: 0, sources: 1, flux_lm: 1.0, bytes: 0, narrowest_lobe: 1.0, warnings: Vec::new() };
     let job = Job::parse(text, "test.toml")?;
     let bounds = vec![1.0; if job.is_bounded() { job.sets().len() } else { 0 }];
     let plan = Plan::new("test", job, Input::of("test.toml", text.as_bytes()), Vec::new(), scene)?;
@@ -74,6 +75,7 @@ pub fn scores(plan: &Plan, index: u64) -> BatchScores {
             s.value[i] = g.uniform();
             s.direct[i] = 0.1 * s.value[i];
             s.peak[i] = g.uniform();
+            s.caustic[i] = g.uniform();
             s.existed[i] = g.uniform() < 0.9;
         }
         s.colour.iter_mut().for_each(|c| *c = [g.uniform(), g.uniform(), g.uniform()]);

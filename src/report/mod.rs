@@ -24,7 +24,7 @@
 //! | `direct.Y` | the part of `luminance.Y` that is emitted or reflected once (L0 + K L0) |
 //!
 //! Codes of the health: 1 no information, 2 few batches, 4 relative error, 8 peak, 16 vov (not in maps), 32 tail, 64
-//! checks; `tally::health` says when each is set. The note of a table has the same words.
+//! checks, 128 caustic; `tally::health` says when each is set. The note of a table has the same words.
 //!
 //! NaN stands wherever nothing is known: no receiver, no batch, no history that reached it. The report turns counted numbers into
 //! files; how they were produced it does not know, and it never recomputes them.

@@ -42,6 +42,8 @@ pub(super) struct Bin {
     pub peak: f64,
     /// Variance of the variance of the batch scores \[1\]; NaN where only moments are kept.
     pub vov: f64,
+    /// Light that no bound holds, of the batch that has most of it \[cd/m2 or lx\].
+    pub caustic: f64,
     /// Linear Rec.709 whose luminance is `value`.
     pub colour: [f64; 3],
     /// What is known.
@@ -61,6 +63,7 @@ impl Bin {
             direct: nan,
             peak: nan,
             vov: nan,
+            caustic: nan,
             colour: [nan; 3],
             status,
             health: None,
@@ -73,7 +76,7 @@ impl Bin {
         if self.standard_error == 0.0 { 0.0 } else { self.standard_error / self.value.abs() }
     }
 
-    /// All numbers in a fixed order, for a digest.
+    /// All numbers in a fixed order, for a digest; caustic light is part of the health alone.
     pub fn numbers(&self) -> [f64; 11] {
         let [r, g, b] = self.colour;
         let health = self.health_code();
@@ -109,6 +112,7 @@ impl SetValues {
             batches,
             quantile: student_quantile(run.confidence, batches),
             histories: batches as f64 * run.histories_per_batch as f64,
+            narrowest_lobe: plan.scene.narrowest_lobe,
         };
         let bins = match set {
             SetResult::Moments { bins, .. } => {
@@ -162,6 +166,7 @@ struct Raw {
     direct: f64,
     peak: f64,
     vov: f64,
+    caustic: f64,
     colour: Option<[f64; 3]>,
 }
 
@@ -172,6 +177,7 @@ impl Raw {
             direct: bins.direct[i],
             peak: bins.peak[i],
             vov: f64::NAN,
+            caustic: bins.caustic[i],
             colour: bins.colour.get(i).copied(),
         }
     }
@@ -182,6 +188,7 @@ impl Raw {
             direct: scores.direct_mean(i),
             peak: scores.peak[i],
             vov: variance_of_variance(scores.scores(i)),
+            caustic: scores.caustic[i],
             colour: None,
         }
     }
@@ -193,6 +200,8 @@ struct Rule {
     quantile: f64,
     /// Histories of all batches.
     histories: f64,
+    /// alpha of the narrowest lobe in the scene.
+    narrowest_lobe: f64,
 }
 
 impl Rule {
@@ -225,6 +234,7 @@ impl Rule {
             direct: fixed + raw.direct,
             peak: self.peak(raw),
             vov: raw.vov,
+            caustic: raw.caustic,
             // Fixed light has no colour of its own in a tally: added as grey it keeps the luminance right.
             colour: raw.colour.map_or([estimate.mean; 3], |c| c.map(|x| x + fixed)),
             status: status(estimate),
@@ -243,6 +253,8 @@ impl Rule {
             history_vov: examined.map_or(f64::NAN, Examined::vov),
             slope: examined.and_then(|e| e.slope),
             failed_checks: examined.map_or(0, Examined::failed_checks),
+            caustic: bin.caustic / bin.standard_error,
+            histories_in_lobe: self.histories * self.narrowest_lobe * self.narrowest_lobe,
         })
     }
 

@@ -90,6 +90,7 @@ pub struct Scene {
     surfaces: Vec<Surface>,
     surface_of: Vec<u32>,
     has_peaks: bool,
+    narrowest_lobe: f64,
     reflects: bool,
 }
 
@@ -137,9 +138,21 @@ impl Scene {
         let cameras = model.cameras.into_iter().map(|c| CameraNode { eye: c.eye + offset, ..c }).collect();
         let used = || surface_of.iter().map(|&s| &surfaces[s as usize].reflectance);
         let has_peaks = used().any(Reflectance::is_peaked);
+        let narrowest_lobe = used().filter_map(Reflectance::narrow_lobe).fold(1.0, f64::min);
         let reflects = used().any(|r| !r.is_black());
-        let nodes = model.nodes;
-        Ok(Scene { geometry, sources, cameras, nodes, warnings, offset, surfaces, surface_of, has_peaks, reflects })
+        Ok(Scene {
+            geometry,
+            sources,
+            cameras,
+            nodes: model.nodes,
+            warnings,
+            offset,
+            surfaces,
+            surface_of,
+            has_peaks,
+            narrowest_lobe,
+            reflects,
+        })
     }
 
     /// A position of the job in the coordinates of the scene \[m\].
@@ -175,6 +188,12 @@ impl Scene {
     /// True when some surface reflects in a peaked lobe.
     pub fn has_peaks(&self) -> bool {
         self.has_peaks
+    }
+
+    /// alpha of the narrowest lobe in which a surface reflects \[1\]: 0 where there is a mirror, 1 without any lobe that
+    /// is peaked.
+    pub fn narrowest_lobe(&self) -> f64 {
+        self.narrowest_lobe
     }
 
     /// Number of triangles.

@@ -40,6 +40,9 @@ pub struct Scores {
     pub colour: Vec<[f64; 3]>,
     /// The largest total of a single history, direct light left out.
     pub peak: Vec<f64>,
+    /// The part of `value` by ways that no bound holds: light that a mirror sent beside an edge, and about what narrow lobes
+    /// reflect of lights without extent. For the health of the result alone.
+    pub caustic: Vec<f64>,
     /// Whether the receiver of the bin existed: a surface that reflects was hit.
     pub existed: Vec<bool>,
     /// Single histories of the monitored bins, in their order.
@@ -56,6 +59,7 @@ impl Scores {
             direct: vec![0.0; bins],
             colour: vec![[0.0; 3]; if colour { bins } else { 0 }],
             peak: vec![0.0; bins],
+            caustic: vec![0.0; bins],
             existed: vec![false; bins],
             watched: vec![Watched::default(); shape.monitored.len()],
         }
@@ -70,6 +74,7 @@ impl Scores {
         self.direct.iter().for_each(&mut feed);
         self.colour.iter().flatten().for_each(&mut feed);
         self.peak.iter().for_each(&mut feed);
+        self.caustic.iter().for_each(&mut feed);
         self.watched.iter().flat_map(|w| &w.totals).for_each(&mut feed);
         self.existed.iter().for_each(|&e| {
             hasher.update(&[u8::from(e)]);

@@ -18,6 +18,8 @@ pub struct MomentBlock {
     pub direct: Vec<f64>,
     /// Largest total of a single history.
     pub peak: Vec<f64>,
+    /// Largest caustic light of a batch, see [`Scores::caustic`].
+    pub caustic: Vec<f64>,
     /// Batches in which the receiver of the bin existed.
     pub existed: Vec<u64>,
     /// Means of R, G, B; empty where no colour is kept.
@@ -41,6 +43,7 @@ impl MomentBlock {
             m2: vec![0.0; bins],
             direct: vec![0.0; bins],
             peak: vec![0.0; bins],
+            caustic: vec![0.0; bins],
             existed: vec![0; bins],
             colour: vec![[0.0; 3]; if colour { bins } else { 0 }],
         }
@@ -58,7 +61,7 @@ impl MomentBlock {
 
     /// True when all columns have `bins` entries, as those of a block read from a file must.
     pub fn has_shape(&self, bins: usize, colour: bool) -> bool {
-        let f64s = [&self.mean, &self.m2, &self.direct, &self.peak];
+        let f64s = [&self.mean, &self.m2, &self.direct, &self.peak, &self.caustic];
         f64s.iter().all(|c| c.len() == bins)
             && self.existed.len() == bins
             && self.colour.len() == if colour { bins } else { 0 }
@@ -72,6 +75,7 @@ impl MomentBlock {
             m2: self.m2[range.clone()].to_vec(),
             direct: self.direct[range.clone()].to_vec(),
             peak: self.peak[range.clone()].to_vec(),
+            caustic: self.caustic[range.clone()].to_vec(),
             existed: self.existed[range].to_vec(),
             colour,
         }
@@ -83,6 +87,7 @@ impl MomentBlock {
         self.m2.append(&mut other.m2);
         self.direct.append(&mut other.direct);
         self.peak.append(&mut other.peak);
+        self.caustic.append(&mut other.caustic);
         self.existed.append(&mut other.existed);
         self.colour.append(&mut other.colour);
     }
@@ -102,6 +107,7 @@ impl MomentBlock {
             self.m2[i] = self.m2[i] + other.m2[i] + d * d * a * b / n;
             self.direct[i] = mean(self.direct[i], other.direct[i]);
             self.peak[i] = self.peak[i].max(other.peak[i]);
+            self.caustic[i] = self.caustic[i].max(other.caustic[i]);
             // Saturating: a count from a file is not ours to trust.
             self.existed[i] = self.existed[i].saturating_add(other.existed[i]);
         }
@@ -134,6 +140,7 @@ impl Moments {
             b.m2[i] += d * (score - b.mean[i]);
             b.direct[i] += (scores.direct[i] - b.direct[i]) / n;
             b.peak[i] = b.peak[i].max(scores.peak[i]);
+            b.caustic[i] = b.caustic[i].max(scores.caustic[i]);
             b.existed[i] += u64::from(scores.existed[i]);
         }
         for (mean, score) in b.colour.iter_mut().zip(&scores.colour) {

@@ -15,6 +15,8 @@ pub struct Replicates {
     pub direct: Vec<f64>,
     /// Largest total of a single history, one entry a bin.
     pub peak: Vec<f64>,
+    /// Largest caustic light of a batch, one entry a bin, see [`Scores::caustic`].
+    pub caustic: Vec<f64>,
     /// Batches in which the receiver of the bin existed, one entry a bin.
     pub existed: Vec<u64>,
 }
@@ -23,28 +25,30 @@ impl Replicates {
     /// No batches yet of `bins` bins.
     pub fn new(bins: usize) -> Self {
         let (value, direct) = (Vec::new(), Vec::new());
-        Replicates { bins: bins as u64, value, direct, peak: vec![0.0; bins], existed: vec![0; bins] }
+        let (peak, caustic) = (vec![0.0; bins], vec![0.0; bins]);
+        Replicates { bins: bins as u64, value, direct, peak, caustic, existed: vec![0; bins] }
     }
 
     /// Takes in a batch of numbers whose single histories are not known: what the batch adds to its direct
     /// part stands for one.
     pub fn accumulate(&mut self, value: &[f64], direct: &[f64]) {
         let peak: Vec<f64> = value.iter().zip(direct).map(|(v, d)| (v - d).abs()).collect();
-        self.take(value, direct, &peak, &vec![true; value.len()]);
+        self.take(value, direct, [&peak, &vec![0.0; value.len()]], &vec![true; value.len()]);
     }
 
     /// Takes in the scores of one batch.
     pub fn accumulate_scores(&mut self, scores: &Scores) {
-        self.take(&scores.value, &scores.direct, &scores.peak, &scores.existed);
+        self.take(&scores.value, &scores.direct, [&scores.peak, &scores.caustic], &scores.existed);
     }
 
-    fn take(&mut self, value: &[f64], direct: &[f64], peak: &[f64], existed: &[bool]) {
-        let lengths = [value.len(), direct.len(), peak.len(), existed.len()];
+    fn take(&mut self, value: &[f64], direct: &[f64], [peak, caustic]: [&[f64]; 2], existed: &[bool]) {
+        let lengths = [value.len(), direct.len(), peak.len(), caustic.len(), existed.len()];
         assert!(lengths.iter().all(|&n| n as u64 == self.bins), "scores of another shape");
         self.value.extend_from_slice(value);
         self.direct.extend_from_slice(direct);
         for i in 0..value.len() {
             self.peak[i] = self.peak[i].max(peak[i]);
+            self.caustic[i] = self.caustic[i].max(caustic[i]);
             self.existed[i] += u64::from(existed[i]);
         }
     }
@@ -56,6 +60,7 @@ impl Replicates {
             && entries == Some(self.value.len() as u64)
             && self.direct.len() == self.value.len()
             && self.peak.len() == bins
+            && self.caustic.len() == bins
             && self.existed.len() == bins
     }
 
@@ -66,6 +71,7 @@ impl Replicates {
         self.direct.append(&mut next.direct);
         for i in 0..self.peak.len() {
             self.peak[i] = self.peak[i].max(next.peak[i]);
+            self.caustic[i] = self.caustic[i].max(next.caustic[i]);
             // Saturating: a count from a file is not ours to trust.
             self.existed[i] = self.existed[i].saturating_add(next.existed[i]);
         }

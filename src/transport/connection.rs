@@ -5,7 +5,8 @@
 //! the peaks of the two laws of reflection in these directions (1 for matt ones) and b the bound of the kernel: so no
 //! history scores more than W b/pi^2 there. What is left reaches the receiver through [`super::continuation`], whose points
 //! are receivers of the same owner. b is infinite for the plain local estimate, and for light that a delta
-//! scatterer sent to the vertex: no continuation could find it.
+//! scatterer sent to the vertex: no continuation could find it. How much that is, and how much comes by continuations, is
+//! summed beside, for the health of the result.
 //!
 //! Loop order is tile -> history -> vertex: a tile stays in the first cache, a history's vertices are summed in f32
 //! (one channel or three), and its total goes once, in f64, to the owner. Sums run in the order of the histories, so
@@ -42,6 +43,8 @@ struct Connector {
 #[derive(Debug, Default)]
 pub struct Connectors {
     all: Vec<Connector>,
+    /// True when some vertex was lit straight by a delta scatterer.
+    mirrored: bool,
     /// End of each history in `all`.
     ends: Vec<usize>,
 }
@@ -50,6 +53,7 @@ impl Connectors {
     /// Appends the vertices of the next history.
     pub fn push(&mut self, scene: &Scene, history: &[Vertex]) {
         self.all.extend(history.iter().map(|v| connector(scene, v)));
+        self.mirrored |= history.iter().any(|v| v.after_delta);
         self.ends.push(self.all.len());
     }
 
@@ -91,13 +95,18 @@ pub struct Link {
     pub receiver: Receiver,
 }
 
-/// What histories give one owner: sums over histories, not yet divided by their number.
+/// What histories give one owner: sums over histories, not yet divided by their number. `mirrored` and `continued` are for
+/// [`Connected::unbounded`] alone.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Connected {
     /// Sum of the totals of all histories.
     pub sum: Colour,
     /// The largest luminous total of a single history.
     pub peak: f64,
+    /// Where histories met mirrors, the luminous part of `sum` by vertices that a delta scatterer lit straight.
+    pub mirrored: f64,
+    /// Where histories met mirrors, the luminous part of `sum` that came by continuations.
+    pub continued: f64,
     /// The luminous total of every history, where it is wanted.
     pub totals: Option<Vec<f64>>,
 }
@@ -129,32 +138,42 @@ pub fn connect(
 ) {
     assert!(start.len() == connected.len() && start.len() <= TILE, "at most {TILE} owners");
     match rule.channels {
-        1 => connect_channels::<1>(scene, connectors.iter(histories), tiles, rule, start, connected),
-        _ => connect_channels::<3>(scene, connectors.iter(histories), tiles, rule, start, connected),
+        1 => connect_channels::<1>(scene, connectors, histories, tiles, rule, start, connected),
+        _ => connect_channels::<3>(scene, connectors, histories, tiles, rule, start, connected),
     }
 }
 
-fn connect_channels<'a, const C: usize>(
+fn connect_channels<const C: usize>(
     scene: &Scene,
-    histories: impl Iterator<Item = &'a [Connector]>,
+    connectors: &Connectors,
+    histories: Range<usize>,
     tiles: &[&Tile],
     rule: &Rule,
     start: &[Colour],
     connected: &mut [Connected],
 ) {
-    let mut sums = [[0f32; TILE]; C];
+    let mut sums = Sums::<C>::new();
     let mut totals = [Colour::BLACK; TILE];
     // Where nothing is known beforehand and nobody counts histories, those without vertices need not be looked at.
     let idle = start.iter().all(|c| c.is_black()) && connected.iter().all(|c| c.totals.is_none());
-    for history in histories.filter(|h| !(idle && h.is_empty())) {
+    for history in connectors.iter(histories).filter(|h| !(idle && h.is_empty())) {
         let totals = &mut totals[..connected.len()];
         totals.copy_from_slice(start);
         for tile in tiles {
-            sums.iter_mut().for_each(|s| s[..tile.links.len()].fill(0.0));
+            sums.clear(tile.links.len());
             for vertex in history.iter().filter(|v| rule.orders.contains(&(v.order + tile.depth))) {
                 tile.add(scene, vertex, rule.bound as f32, &mut sums);
             }
-            tile.add_totals(&sums, totals);
+            tile.add_totals(&sums.light, |owner, total| totals[owner] += total);
+            if sums.has_mirrored {
+                tile.add_totals(&sums.mirrored, |owner, total| connected[owner].mirrored += total.luminance());
+            }
+            if connectors.mirrored && tile.depth > 0 {
+                tile.add_totals(&sums.light, |owner, total| connected[owner].continued += total.luminance());
+            }
+        }
+        if connectors.mirrored {
+            connected.iter_mut().zip(start).for_each(|(into, start)| into.continued += start.luminance());
         }
         for (total, into) in totals.iter().zip(&mut *connected) {
             into.add(*total);
@@ -163,12 +182,41 @@ fn connect_channels<'a, const C: usize>(
 }
 
 impl Connected {
+    /// About the luminous light that no bound holds, as a sum over histories: of what a mirror sends to the surfaces around
+    /// the receiver, the share that continuations bring of all other light.
+    pub fn unbounded(&self) -> f64 {
+        // Nothing was mirrored where nothing came at all.
+        if self.mirrored > 0.0 { self.mirrored * self.continued / self.sum.luminance() } else { 0.0 }
+    }
+
     /// Takes in the total of one history.
     fn add(&mut self, total: Colour) {
         self.sum += total;
         self.peak = self.peak.max(total.luminance());
         if let Some(totals) = &mut self.totals {
             totals.push(total.luminance());
+        }
+    }
+}
+
+/// What one history gives the links of a tile, constant responses left out.
+struct Sums<const C: usize> {
+    light: [[f32; TILE]; C],
+    /// The part of `light` by vertices that a delta scatterer lit straight.
+    mirrored: [[f32; TILE]; C],
+    has_mirrored: bool,
+}
+
+impl<const C: usize> Sums<C> {
+    fn new() -> Self {
+        Sums { light: [[0.0; TILE]; C], mirrored: [[0.0; TILE]; C], has_mirrored: false }
+    }
+
+    /// Back to zero for a tile of `links`.
+    fn clear(&mut self, links: usize) {
+        self.light.iter_mut().for_each(|s| s[..links].fill(0.0));
+        if std::mem::take(&mut self.has_mirrored) {
+            self.mirrored.iter_mut().for_each(|s| s[..links].fill(0.0));
         }
     }
 }
@@ -218,16 +266,34 @@ impl Tile {
     }
 
     /// Adds what `vertex` gives each receiver, a constant response left out.
-    fn add<const C: usize>(&self, scene: &Scene, vertex: &Connector, bound: f32, sums: &mut [[f32; TILE]; C]) {
+    fn add<const C: usize>(&self, scene: &Scene, vertex: &Connector, bound: f32, sums: &mut Sums<C>) {
         let mut factors = [0f32; TILE];
         let factors = &mut factors[..self.links.len()];
-        let bound = if vertex.after_delta { f32::INFINITY } else { bound };
         self.factors(vertex, factors);
         scene.geometry.shadow(vertex.lifted, &self.lifted, factors);
-        if vertex.glossy.is_none() && self.all_constant {
-            add_constant(sums, &vertex.intensity, bound, factors);
+        if vertex.after_delta {
+            sums.has_mirrored = true;
+            self.spread(scene, vertex, factors, |factor, _| factor, &mut sums.light);
+            self.spread(scene, vertex, factors, |factor, _| factor, &mut sums.mirrored);
         } else {
-            self.add_varying(scene, sums, vertex, bound, factors);
+            self.spread(scene, vertex, factors, |factor, peak| factor.min(bound / peak), &mut sums.light);
+        }
+    }
+
+    /// Adds to `sums` what `vertex` sends each receiver over the part of its geometric factor that `carried` gives, of the
+    /// factor and of the peaks of both laws.
+    fn spread<const C: usize>(
+        &self,
+        scene: &Scene,
+        vertex: &Connector,
+        factors: &[f32],
+        carried: impl Fn(f32, f32) -> f32,
+        sums: &mut [[f32; TILE]; C],
+    ) {
+        if vertex.glossy.is_none() && self.all_constant {
+            add_constant(sums, &vertex.intensity, factors, |factor| carried(factor, 1.0));
+        } else {
+            self.add_varying(scene, vertex, factors, carried, sums);
         }
     }
 
@@ -248,10 +314,10 @@ impl Tile {
     fn add_varying<const C: usize>(
         &self,
         scene: &Scene,
-        sums: &mut [[f32; TILE]; C],
         vertex: &Connector,
-        bound: f32,
         factors: &[f32],
+        carried: impl Fn(f32, f32) -> f32,
+        sums: &mut [[f32; TILE]; C],
     ) {
         for (i, &factor) in factors.iter().enumerate().filter(|(_, f)| **f != 0.0) {
             let receiver = &self.links[i].receiver;
@@ -268,27 +334,32 @@ impl Tile {
                 value = std::array::from_fn(|c| value[c] * response.0[c] as f32);
                 peak *= of_receiver;
             }
-            let carried = factor.min(bound / peak as f32);
+            let carried = carried(factor, peak as f32);
             for (sum, &v) in sums.iter_mut().zip(&value) {
                 sum[i] += v * carried;
             }
         }
     }
 
-    /// Adds the sums of one history to the totals of the owners.
-    fn add_totals<const C: usize>(&self, sums: &[[f32; TILE]; C], totals: &mut [Colour]) {
+    /// Hands the sums of one history to the owners, link by link.
+    fn add_totals<const C: usize>(&self, sums: &[[f32; TILE]; C], mut add: impl FnMut(usize, Colour)) {
         for (i, link) in self.links.iter().enumerate() {
             let sum = Colour(std::array::from_fn(|c| f64::from(sums[c.min(C - 1)][i])));
-            totals[link.owner] += sum * self.constant[i].unwrap_or(Colour::WHITE);
+            add(link.owner, sum * self.constant[i].unwrap_or(Colour::WHITE));
         }
     }
 }
 
-/// Adds `intensity` x bounded factor to every receiver.
-fn add_constant<const C: usize>(sums: &mut [[f32; TILE]; C], intensity: &[f32; 3], bound: f32, factors: &[f32]) {
+/// Adds `intensity` x carried factor to every receiver.
+fn add_constant<const C: usize>(
+    sums: &mut [[f32; TILE]; C],
+    intensity: &[f32; 3],
+    factors: &[f32],
+    carried: impl Fn(f32) -> f32,
+) {
     for (sums, &intensity) in sums.iter_mut().zip(intensity) {
         for (sum, &factor) in sums.iter_mut().zip(factors) {
-            *sum += intensity * factor.min(bound);
+            *sum += intensity * carried(factor);
         }
     }
 }

@@ -22,7 +22,7 @@
 //! component: light that a mirror sends to y_k is carried by connections alone (their b is infinite then), so
 //! bounded and plain estimates have the same mean.
 
-use super::direct::{from_emitters, from_lights};
+use super::direct::{from_emitters, from_lights, from_lights_as_if_matt};
 use super::receiver::{Receiver, Response};
 use crate::geometry::{Hit, Ray};
 use crate::math::DVec3;
@@ -42,6 +42,10 @@ pub struct Continuation {
     pub direct: Vec<Colour>,
     /// y_1, y_2, ... as receivers whose response holds T_k.
     pub points: Vec<Receiver>,
+    /// Luminous light of sources without extent at the peaked points, as the receiver would respond to it if they were
+    /// matt \[lx or cd/m2\]. What they really reflect of it has this order of magnitude and comes in spikes: no
+    /// direction can be drawn towards such a source, so that its image in a narrow lobe is met by chance alone.
+    pub caustic: f64,
 }
 
 /// True when connections may leave something of the light that arrives at `receiver`: a continuation is due.
@@ -71,6 +75,9 @@ pub fn continue_from(scene: &Scene, receiver: &Receiver, bound: f64, rng: &mut G
         }
         let next = found.receiver(weight);
         path.direct.push(from_lights(scene, &next) + from_emitters(scene, &next, 1, rng));
+        if next.response.is_peaked(scene) {
+            path.caustic += from_lights_as_if_matt(scene, &next).luminance();
+        }
         path.points.push(next);
         at = next;
     }

@@ -25,6 +25,15 @@ pub fn emitter_samples(histories: u64) -> u64 {
 
 /// Light from point, spot and directional lights, times the response \[lx or cd/m2\].
 pub fn from_lights(scene: &Scene, receiver: &Receiver) -> Colour {
+    light_by_light(scene, receiver, |w_in| receiver.response.to(scene, receiver.normal, w_in))
+}
+
+/// The same with the response of a matt surface that reflects as much: without the peaks of a narrow lobe.
+pub fn from_lights_as_if_matt(scene: &Scene, receiver: &Receiver) -> Colour {
+    light_by_light(scene, receiver, |w_in| receiver.response.as_if_matt(scene, receiver.normal, w_in))
+}
+
+fn light_by_light(scene: &Scene, receiver: &Receiver, response: impl Fn(DVec3) -> Colour) -> Colour {
     let lifted = scene.geometry.lift(receiver.position, receiver.normal);
     let mut sum = Colour::BLACK;
     for light in &scene.sources.lights {
@@ -38,7 +47,7 @@ pub fn from_lights(scene: &Scene, receiver: &Receiver) -> Colour {
             None => scene.geometry.closest_hit(&Ray { origin: lifted, direction: -w_in }).is_none(),
         };
         if visible {
-            sum += across * cosine * receiver.response.to(scene, receiver.normal, w_in);
+            sum += across * cosine * response(w_in);
         }
     }
     sum

@@ -73,6 +73,16 @@ impl Response {
         }
     }
 
+    /// The response of a matt surface that reflects as much of the light propagating along `w_in`, all of it carried.
+    pub fn as_if_matt(&self, scene: &Scene, normal: DVec3, w_in: DVec3) -> Colour {
+        match self {
+            Response::Cosine => Colour::WHITE,
+            Response::Reflectance { primitive, attenuation, .. } => {
+                scene.surface(*primitive).reflectance.albedo(-w_in.dot(normal)) * *attenuation / PI
+            }
+        }
+    }
+
     /// True when connections to a receiver with this response are spiky.
     pub fn is_peaked(&self, scene: &Scene) -> bool {
         match self {

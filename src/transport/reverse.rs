@@ -39,6 +39,8 @@ pub struct Found {
     pub direct: Colour,
     /// All other light.
     pub reflected: Colour,
+    /// About what narrow lobes reflected of lights without extent: what they would reflect if they were matt.
+    pub caustic: Colour,
 }
 
 /// Follows one path from `receiver`.
@@ -53,6 +55,10 @@ pub fn path(scene: &Scene, transport: &Transport, receiver: &Receiver, rng: &mut
         let response = |w_in| surface.reflectance.evaluate(hit.normal, w_in, back);
         *(if met == 1 { &mut found.direct } else { &mut found.reflected }) += weight * surface.emission;
         found.reflected += weight * from_lights(scene, hit.position, hit.normal, response);
+        if surface.reflectance.is_peaked() {
+            let matt = |w_in: DVec3| surface.reflectance.albedo(-w_in.dot(hit.normal)) / PI;
+            found.caustic += weight * from_lights(scene, hit.position, hit.normal, matt);
+        }
         let Some(next) = surface.reflectance.sample(hit.normal, ray.direction, rng) else { break };
         // No connection carries what a mirror sends straight to the receiver.
         if met == 1 && next.delta {

@@ -24,6 +24,11 @@ impl Case {
     pub fn new(toml: &str, model: Model) -> Case {
         Case(Experiment::new(toml, model).unwrap())
     }
+
+    /// Bounds the kernel by `bound` at every receiver set, instead of as planned \[1/m2\].
+    pub fn bound_all(&mut self, bound: f64) {
+        self.0.bounds.fill(bound);
+    }
 }
 
 impl Deref for Case {

@@ -55,9 +55,9 @@ fn damaged_checkpoints_are_refused() {
     }
     fs::write(&path, [&whole[..], b"\n"].concat()).unwrap();
     refused(&place, &dir, "damaged: 1 trailing bytes", true);
-    let newer = 2u32.to_le_bytes();
+    let newer = 3u32.to_le_bytes();
     fs::write(&path, [&whole[..8], &newer, &whole[12..]].concat()).unwrap();
-    refused(&place, &dir, "format version 2 is newer; this program reads version 1", true);
+    refused(&place, &dir, "format version 3 is newer; this program reads version 2", true);
     let flips = [
         (3, "not a checkpoint of lampyris"),
         (16, "damaged: wrong checksum of the header"),

@@ -32,6 +32,24 @@ fn maps_hold_the_code_of_the_marks() {
 }
 
 #[test]
+fn caustic_light_is_marked_where_it_could_spoil_the_interval() {
+    let codes = |narrowest_lobe: f64| {
+        let mut plan = plan(JOB);
+        plan.scene.narrowest_lobe = narrowest_lobe;
+        let mut result = merged(64);
+        let mut bins = moments(6, 64, false);
+        // Standard errors are 0.1: a tenth of the half-width is 0.02.
+        (bins.caustic[0], bins.caustic[1]) = (0.019, 0.021);
+        result.sets[0] = SetResult::Moments { bins, fixed_direct: Vec::new() };
+        let dir = written(&plan, &result);
+        summary(dir.path())["sets"][0]["marks"]["caustic"].as_u64().unwrap()
+    };
+    let histories = 64.0 * plan(JOB).job.run.histories_per_batch as f64;
+    let known = (30.0 / histories).sqrt();
+    assert_eq!([0.0, 0.99 * known, 1.01 * known].map(codes), [1, 1, 0], "a mirror, a narrow lobe, a wider one");
+}
+
+#[test]
 fn marks_are_counted_and_said_in_a_line() {
     let dir = written(&plan(JOB), &suspicious());
     let view = &summary(dir.path())["sets"][0];

@@ -70,6 +70,7 @@ fn plan(job: &str) -> Plan {
             sources: 1,
             flux_lm: 12.0,
             bytes: 0,
+            narrowest_lobe: 1.0,
             warnings: vec!["range ignored".into()],
         },
         bounds: Vec::new(),

@@ -24,7 +24,7 @@ use std::ops::Range;
 /// First bytes of every checkpoint; the last two find transfers that translate line ends.
 pub const MAGIC: [u8; 8] = *b"LAMPYR\r\n";
 /// Version of the format that this program writes and reads.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 /// Bins of a map that are stored, checked and merged together.
 pub const BLOCK: usize = 4096;
 /// Magic, version and header length \[bytes\].

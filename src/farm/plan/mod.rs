@@ -43,6 +43,8 @@ pub struct SceneSummary {
     pub flux_lm: f64,
     /// Memory of geometry and acceleration structure \[bytes\].
     pub bytes: u64,
+    /// alpha of the narrowest lobe in which a surface reflects \[1\]: 0 where there is a mirror, 1 where none is peaked.
+    pub narrowest_lobe: f64,
     /// What was ignored or replaced, each with its effect.
     pub warnings: Vec<String>,
 }

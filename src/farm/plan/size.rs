@@ -117,8 +117,8 @@ fn monitor_bytes(set: &SetShape, batches: u64) -> u64 {
 fn tally_bytes(set: &SetShape, batches: u64) -> u64 {
     let bins = set.bins() as u64;
     let kept = match set.kept {
-        Kept::Moments { colour } => bins * NUMBER * if colour { 9 } else { 6 },
-        Kept::EveryBatch => (3 * bins * NUMBER).saturating_add(kept_bytes(bins, batches)),
+        Kept::Moments { colour } => bins * NUMBER * if colour { 10 } else { 7 },
+        Kept::EveryBatch => (4 * bins * NUMBER).saturating_add(kept_bytes(bins, batches)),
     };
     kept.saturating_add(monitor_bytes(set, batches))
 }
@@ -126,8 +126,8 @@ fn tally_bytes(set: &SetShape, batches: u64) -> u64 {
 /// Scores, receivers and single histories of one batch.
 fn score_bytes(set: &SetShape, histories: u64) -> u64 {
     let numbers = match set.kept {
-        Kept::Moments { colour: true } => 7,
-        Kept::Moments { colour: false } | Kept::EveryBatch => 4,
+        Kept::Moments { colour: true } => 8,
+        Kept::Moments { colour: false } | Kept::EveryBatch => 5,
     };
     let placed = match set.kind {
         ReceiverKind::Camera | ReceiverKind::Gonio => RECEIVER,

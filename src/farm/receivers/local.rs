@@ -25,6 +25,7 @@ struct BinScore {
     value: Colour,
     direct: Colour,
     peak: f64,
+    caustic: f64,
     existed: bool,
     watched: Option<Vec<f64>>,
 }
@@ -48,6 +49,7 @@ impl ReceiverSet {
     ) -> TileScores {
         let sensed: Vec<_> = bins.iter().map(|&bin| self.sense(scene, bin as usize, batch)).collect();
         let mut connected: Vec<Connected> = bins.iter().map(|bin| self.nothing(*bin)).collect();
+        let mut caustics = vec![0.0; bins.len()];
         let links = |(owner, receiver): (usize, Option<Receiver>)| Some(Link { owner, receiver: receiver? });
         let links: Vec<Link> = sensed.iter().map(|s| s.receiver).enumerate().filter_map(links).collect();
         let mut continued = self.continued(scene, &links, bins, batch);
@@ -58,14 +60,18 @@ impl ReceiverSet {
         for group in 0..groups {
             let range = group * all / groups..(group + 1) * all / groups;
             let mut start = vec![Colour::BLACK; bins.len()];
-            let tiles = continue_all(scene, &mut continued, &rule, &mut start);
+            let mut caustic = vec![0.0; bins.len()];
+            let tiles = continue_all(scene, &mut continued, &rule, &mut start, &mut caustic);
             let tiles: Vec<&Tile> = std::iter::once(&base).chain(&tiles).collect();
+            let served = range.len() as f64;
+            caustics.iter_mut().zip(caustic).for_each(|(sum, caustic)| *sum += caustic * served);
             connect(scene, histories, range, &tiles, &rule, &start, &mut connected);
         }
-        let scores = sensed.iter().zip(connected).map(|(sensed, connected)| {
+        let scores = sensed.iter().zip(connected).zip(caustics).map(|((sensed, connected), caustic)| {
             let value = sensed.direct + connected.sum / self.histories as f64;
             let (direct, existed, peak) = (sensed.direct, sensed.existed, connected.peak);
-            BinScore { value, direct, peak, existed, watched: connected.totals }
+            let caustic = (caustic + connected.unbounded()) / self.histories as f64;
+            BinScore { value, direct, peak, caustic, existed, watched: connected.totals }
         });
         TileScores(scores.collect())
     }
@@ -88,11 +94,18 @@ impl ReceiverSet {
 }
 
 /// Draws the next path of each of the `continued`: its points as tiles, one or more for each depth. Direct light at them is
-/// added to `start`, one entry an owner: every history that the path serves has it.
-fn continue_all(scene: &Scene, continued: &mut [Continued], rule: &Rule, start: &mut [Colour]) -> Vec<Tile> {
+/// added to `start`, one entry an owner, and its caustics to `caustic`: every history that the path serves has them.
+fn continue_all(
+    scene: &Scene,
+    continued: &mut [Continued],
+    rule: &Rule,
+    start: &mut [Colour],
+    caustic: &mut [f64],
+) -> Vec<Tile> {
     let mut of_depth: Vec<Vec<Link>> = Vec::new();
     for Continued { owner, receiver, rng } in continued {
         let path = continue_from(scene, receiver, rule.bound, rng);
+        caustic[*owner] += path.caustic;
         for (k, (direct, point)) in path.direct.into_iter().zip(path.points).enumerate() {
             if of_depth.len() == k {
                 of_depth.push(Vec::new());
@@ -122,6 +135,7 @@ impl TileScores {
             scores.value[bin] = score.value.luminance();
             scores.direct[bin] = score.direct.luminance();
             scores.peak[bin] = score.peak;
+            scores.caustic[bin] = score.caustic;
             scores.existed[bin] = score.existed;
             if let Some(colour) = scores.colour.get_mut(bin) {
                 *colour = score.value.0;

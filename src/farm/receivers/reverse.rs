@@ -20,6 +20,8 @@ pub struct Paths {
     direct: Colour,
     /// The largest luminous total of one path, direct light left out.
     peak: f64,
+    /// Mean of [`Found::caustic`].
+    caustic: f64,
     existed: bool,
     /// The luminous total of each path of a monitored bin, light met by the first ray included.
     totals: Vec<f64>,
@@ -67,6 +69,7 @@ impl ReceiverSet {
             scores.value[bin] = paths.value.luminance();
             scores.direct[bin] = paths.direct.luminance();
             scores.peak[bin] = paths.peak;
+            scores.caustic[bin] = paths.caustic;
             scores.existed[bin] = paths.existed;
             if let Some(colour) = scores.colour.get_mut(bin) {
                 *colour = paths.value.0;
@@ -85,6 +88,7 @@ impl Paths {
         self.direct += direct;
         self.value += direct + found.reflected;
         self.peak = self.peak.max(found.reflected.luminance());
+        self.caustic += found.caustic.luminance();
         self.existed |= existed;
         if watched {
             self.totals.push((found.direct + found.reflected).luminance());
@@ -94,5 +98,6 @@ impl Paths {
     fn divide_by(&mut self, paths: u64) {
         self.value = self.value / paths as f64;
         self.direct = self.direct / paths as f64;
+        self.caustic /= paths as f64;
     }
 }

@@ -198,6 +198,13 @@ impl Glossy {
         }
     }
 
+    pub(super) fn narrow_lobe(&self) -> Option<f64> {
+        match &self.specular {
+            Specular::Mirror => Some(0.0),
+            Specular::Rough(facets, _) => self.is_peaked().then(|| facets.alpha()),
+        }
+    }
+
     /// True when f without the delta component is zero.
     pub(super) fn is_black(&self) -> bool {
         self.has_delta() && self.diffuse.is_black()

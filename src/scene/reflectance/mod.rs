@@ -140,6 +140,14 @@ impl Reflectance {
         }
     }
 
+    /// alpha of the lobe where it is peaked, 0 of a delta component; `None` of laws without either \[1\].
+    pub fn narrow_lobe(&self) -> Option<f64> {
+        match self {
+            Reflectance::Lambert(_) => None,
+            Reflectance::Glossy(law) => law.narrow_lobe(),
+        }
+    }
+
     /// How many times the tolerated weight a connection with this value of `f` has: at least 1, and 1 for every law that
     /// is not peaked.
     pub fn peak(&self, f: Colour) -> f64 {

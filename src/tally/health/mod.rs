@@ -14,9 +14,15 @@
 //! | vov | 16 | variance of the variance of single histories above [`VOV`] | monitored |
 //! | tail | 32 | slope of the tail of single histories at most [`SLOPE`], and this tail matters: the variance may be infinite | monitored |
 //! | checks | 64 | [`FAILED_CHECKS`] or more of the first nine of the ten checks failed | monitored |
+//! | caustic | 128 | light that no bound holds is above [`CAUSTIC`] standard errors, and fewer than [`LOBE`] histories fall in the narrowest lobe | all |
 //!
 //! A bin that is the same in every batch is known exactly and has no mark. One failed check is no mark: of healthy
 //! runs some percent fail one by chance (`checks`).
+//!
+//! **Caustics** are what no sign of the scores can tell of: light of a lamp without extent in a narrow lobe, and light
+//! from a mirror beside an edge. A run may contain none of the rare histories that carry them, and then looks at its healthiest. So
+//! their size is estimated beforehand, as if lobes were matt, and compared with the error; it stops to matter once
+//! enough histories, N alpha^2 of N, have fallen in the lobe. A mirror has alpha 0.
 //!
 //! **Single histories** tell more of the tail than batch scores, in quasi-random batches too: each point of a scrambled
 //! set has by itself the density of random sampling. Their VOV says nothing there about the error of the mean, but does
@@ -44,6 +50,11 @@ pub const SLOPE: f64 = 3.0;
 /// Variance of the variance of single histories up to which the slope of their tail is no matter \[1\]: where the
 /// variance is infinite it stays near 0.1 and above, however many they are.
 pub const NEGLIGIBLE_VOV: f64 = 0.02;
+/// Largest light that no bound holds and is not marked \[standard errors\]: a tenth of the half-width of an interval
+/// of 95 % that it could spoil if all of it were missing.
+pub const CAUSTIC: f64 = 0.2;
+/// Histories in the narrowest lobe, N alpha^2, from which on its caustics are known well.
+pub const LOBE: f64 = 30.0;
 /// Failed checks, of the first nine, that make a mark.
 pub const FAILED_CHECKS: usize = 3;
 
@@ -64,12 +75,22 @@ pub enum Mark {
     Tail,
     /// Several of the ten checks failed.
     Checks,
+    /// Light that no bound holds, met by few histories.
+    Caustic,
 }
 
 impl Mark {
     /// All marks in the order of their codes.
-    pub const ALL: [Mark; 7] =
-        [Mark::NoInformation, Mark::FewBatches, Mark::RelativeError, Mark::Peak, Mark::Vov, Mark::Tail, Mark::Checks];
+    pub const ALL: [Mark; 8] = [
+        Mark::NoInformation,
+        Mark::FewBatches,
+        Mark::RelativeError,
+        Mark::Peak,
+        Mark::Vov,
+        Mark::Tail,
+        Mark::Checks,
+        Mark::Caustic,
+    ];
 
     /// A power of two.
     pub fn code(self) -> u32 {
@@ -86,6 +107,7 @@ impl Mark {
             Mark::Vov => "vov",
             Mark::Tail => "tail",
             Mark::Checks => "checks",
+            Mark::Caustic => "caustic",
         }
     }
 }
@@ -135,6 +157,10 @@ pub struct Signs {
     pub slope: Option<f64>,
     /// Number of the first nine checks that failed, of a monitored bin.
     pub failed_checks: usize,
+    /// Light that no bound holds, of the batch that has most of it \[standard errors\].
+    pub caustic: f64,
+    /// N alpha^2 of N histories and the narrowest lobe of the scene; 0 where there is a mirror.
+    pub histories_in_lobe: f64,
 }
 
 /// The marks that `signs` set.
@@ -154,6 +180,7 @@ pub fn health(signs: &Signs) -> Health {
         Mark::Vov => (signs.batches >= VOV_BATCHES && signs.vov > VOV) || signs.history_vov > VOV,
         Mark::Tail => signs.slope.is_some_and(|slope| slope <= SLOPE) && signs.history_vov > NEGLIGIBLE_VOV,
         Mark::Checks => signs.failed_checks >= FAILED_CHECKS,
+        Mark::Caustic => signs.caustic > CAUSTIC && signs.histories_in_lobe < LOBE,
     };
     Health(Mark::ALL.into_iter().filter(|&mark| set(mark)).map(Mark::code).sum())
 }

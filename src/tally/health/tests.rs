@@ -155,6 +155,8 @@ const HEALTHY: Signs = Signs {
     history_vov: 0.03,
     slope: Some(STEEPEST),
     failed_checks: 1,
+    caustic: 0.1,
+    histories_in_lobe: 20.0,
 };
 
 #[test]
@@ -170,6 +172,8 @@ fn each_sign_sets_its_own_mark() {
     assert_eq!(code(Signs { slope: Some(2.5), ..HEALTHY }), 32);
     assert_eq!(code(Signs { slope: Some(2.5), history_vov: 0.01, ..HEALTHY }), 0, "a tail that does not matter");
     assert_eq!(code(Signs { failed_checks: FAILED_CHECKS, ..HEALTHY }), 64);
+    assert_eq!(code(Signs { caustic: 0.3, ..HEALTHY }), 128);
+    assert_eq!(code(Signs { caustic: 0.3, histories_in_lobe: 40.0, ..HEALTHY }), 0, "a lobe that many histories met");
     let worst = health(&Signs { batches: 4, relative_error: 0.5, peak: 0.5, slope: Some(2.0), ..HEALTHY });
     let words: Vec<&str> = worst.marks().map(Mark::word).collect();
     assert_eq!((worst.code(), words), (2 + 4 + 8 + 32, vec!["few batches", "relative error", "peak", "tail"]));
@@ -178,7 +182,8 @@ fn each_sign_sets_its_own_mark() {
 #[test]
 fn what_is_not_known_sets_no_mark() {
     let nan = f64::NAN;
-    let unknown = Signs { relative_error: nan, peak: nan, vov: nan, history_vov: nan, slope: None, ..HEALTHY };
+    let unknown =
+        Signs { relative_error: nan, peak: nan, vov: nan, history_vov: nan, slope: None, caustic: nan, ..HEALTHY };
     assert!(health(&unknown).is_healthy());
     assert!(health(&Signs { vov: 0.5, batches: 49, ..HEALTHY }).is_healthy(), "VOV of few batches");
     assert!(health(&Signs { relative_error: 0.0, batches: 1, vov: nan, ..HEALTHY }).is_healthy(), "known exactly");
