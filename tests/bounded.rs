@@ -167,6 +167,23 @@ fn a_peaked_floor_under_an_area_light_is_as_reverse_paths_find_it() {
 }
 
 #[test]
+fn a_floor_that_is_peaked_towards_grazing_alone_is_as_reverse_paths_find_it() {
+    let model = cube_with_peaked_floor(0.25, 20.0);
+    let law = &model.surfaces[2].reflectance;
+    assert!(!law.is_peaked_at(1.0) && law.is_peaked_at(0.17));
+    let receivers = spot_camera("flat", [0.1, 0.12, 0.4], [0.78, 0.0, 0.5], [0.0, 1.0, 0.0])
+        + &point("wall", [0.0, 0.05, 0.4], [1.0, 0.0, 0.0]);
+    let [local, reverse] = bounded_and_reverse(&model, &receivers, (1024, 64), (4096, 64));
+    assert_all(&differences("receiver", &local, &reverse));
+    let job = run(64, 128) + &receivers;
+    let [bounded, plain] = [job.clone(), plain(&job)].map(|job| indirect(&Case::new(&job, model.clone()), ALL));
+    for set in [0, 1] {
+        let gain = variance(&plain[set]) / variance(&bounded[set]);
+        assert!(gain > 4.0, "receiver {set}: the variance falls {gain} times");
+    }
+}
+
+#[test]
 fn a_peaked_floor_under_a_lamp_is_as_reverse_paths_find_it() {
     let model = cube_with_peaked_floor(0.1, 0.0);
     let receivers = omni([0.5, 0.7, 0.5], 10.0) + &peaked_receivers();

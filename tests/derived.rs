@@ -3,9 +3,9 @@
 
 use lampyris::math::{PI, cos, log};
 use lampyris::random::{Domain, Generator, Stream};
-use lampyris::tally::Replicates;
 use lampyris::tally::derived::{Family, Series, family_quantile, jackknife, least, ratio};
 use lampyris::tally::statistics::{Estimate, student_quantile};
+use lampyris::tally::{Replicates, Scores};
 
 const REPLICATES: u64 = 2000;
 const BATCHES: usize = 32;
@@ -27,7 +27,8 @@ fn sigmas(covered: u64, total: u64, nominal: f64) -> f64 {
 }
 
 fn series(scores: &[f64], fixed: f64) -> Series {
-    Series { scores: scores.to_vec(), fixed }
+    let informed = scores.iter().any(|&x| x != 0.0);
+    Series { scores: scores.to_vec(), fixed, informed }
 }
 
 #[test]
@@ -175,7 +176,7 @@ fn shared_errors_cancel_in_the_uniformity_and_not_in_the_minimum() {
 
 #[test]
 fn the_least_observed_mean_lies_low_and_its_jackknife_does_not_cover() {
-    // Why equation (11.5): 40 equal points, each with its own error.
+    // Why equation (11.6): 40 equal points, each with its own error.
     let (mut bias, mut covered) = (0.0, 0);
     for replicate in 0..REPLICATES {
         let scores = grid(&[1.0; 40], 0.0, 0.2, &mut generator("naive", replicate));
@@ -209,6 +210,36 @@ fn points_without_receiver_do_not_count_and_fixed_light_does() {
     assert_eq!((minimum.value, uniformity.value), (5.0, 5.0 / 8.5));
     let half = family_quantile(0.95, 2, 3) / 3f64.sqrt();
     assert!((minimum.low - (5.0 - half)).abs() < 1e-12 && (minimum.high - (5.0 + half)).abs() < 1e-12, "{minimum:?}");
+}
+
+/// A family of two bins over 20 batches, scored by the pair (value and direct part, peak, existed).
+fn batches(score: impl Fn(u64) -> (f64, f64, bool)) -> Replicates {
+    let mut scores = Replicates::new(2);
+    for batch in 0..20 {
+        let (direct, peak, existed) = score(batch);
+        let (value, caustic) = (vec![direct; 2], vec![0.0; 2]);
+        let (direct, peak, existed) = (value.clone(), vec![peak; 2], vec![existed; 2]);
+        scores.accumulate_scores(&Scores { value, direct, peak, caustic, existed, ..Scores::default() });
+    }
+    scores
+}
+
+#[test]
+fn bins_and_what_is_derived_from_them_know_equally_much() {
+    // An area lamp lights both, a little differently in each batch; reflected light could come, and no history brought any.
+    let unknown = batches(|batch| (10.0 + (batch % 2) as f64, 0.0, true));
+    let family = Family::new(&unknown, &[]);
+    assert!(unknown.estimate(0).standard_error.is_nan() && family.mean().estimate().standard_error.is_nan());
+    assert!(family.minimum(0.95).low.is_nan() && family.uniformity(0.95).low.is_nan());
+    assert!(ratio(&family.mean(), &family.mean(), 0.95).standard_error.is_nan());
+    // Nothing reflects: fixed direct light is all there is, and is exact.
+    let exact = batches(|_| (0.0, 0.0, false));
+    let family = Family::new(&exact, &[3.0, 5.0]);
+    let (minimum, uniformity) = (family.minimum(0.95), family.uniformity(0.95));
+    assert_eq!((family.mean().estimate().mean, family.mean().estimate().standard_error), (4.0, 0.0));
+    assert_eq!([minimum.value, minimum.low, minimum.high], [3.0; 3]);
+    assert_eq!([uniformity.value, uniformity.low, uniformity.high], [0.75; 3]);
+    assert_eq!(ratio(&family.mean(), &family.mean(), 0.95).standard_error, 0.0);
 }
 
 #[test]

@@ -128,8 +128,7 @@ fn assert_same_point_is_exact(case: &Case, meter: Receiver) {
     let down = Ray { origin: meter.position + 0.1 * DVec3::Y, direction: DVec3::NEG_Y };
     let floor = case.scene.geometry.closest_hit(&down).unwrap();
     let to_eye = DVec3::new(0.3, 0.8, 0.1).normalize();
-    let response =
-        Response::Reflectance { primitive: floor.primitive, to_eye, attenuation: Colour::WHITE, carried: 0.0 };
+    let response = Response::reflectance(&case.scene, (floor.primitive, floor.normal), to_eye, Colour::WHITE, 0.0);
     let histories = histories(case, 256);
     let connected = common::connect(&case.scene, &histories, f64::INFINITY, &[meter, Receiver { response, ..meter }]);
     let (e, l) = (connected[0].sum.luminance(), connected[1].sum.luminance());
@@ -174,7 +173,7 @@ fn glossy_receiver_in_a_white_furnace() {
     let receiver = |&to_eye: &DVec3| Receiver {
         position: case.scene.place([0.35, 0.0, 0.45]),
         normal: DVec3::Y,
-        response: Response::Reflectance { primitive, to_eye, attenuation: Colour::WHITE, carried: 0.0 },
+        response: Response::reflectance(&case.scene, (primitive, DVec3::Y), to_eye, Colour::WHITE, 0.0),
     };
     let receivers: Vec<Receiver> = directions.iter().map(receiver).collect();
     let stream = Stream::new(44, Domain::Trajectory, "");

@@ -9,6 +9,7 @@ use common::scenes::sobolev;
 use common::{Case, Estimate};
 use gltf_builder::Builder;
 use lampyris::farm::inputs::prepare;
+use lampyris::farm::pilot::bounds;
 use lampyris::farm::realization::Realization;
 use lampyris::job::Job;
 use lampyris::scene::{Model, Scene, gltf};
@@ -197,7 +198,7 @@ rows = 1
 fn row(run: &str) -> (Replicates, Vec<f64>) {
     let job = Job::parse(&(sobolev(run, 0.5, 0.5, 0.7) + ROW), "test.toml").unwrap();
     let scene = Scene::new(Model::default(), &job).unwrap();
-    let realization = Realization::new(&job, &scene, &[]);
+    let realization = Realization::new(&job, &scene, &bounds(&job, &scene));
     let mut scores = Replicates::new(6);
     for batch in 0..job.run.batches {
         let of = &realization.batch(batch).sets[0];

@@ -148,11 +148,11 @@ fn error_bars_from_histories_inside_a_batch_are_rejected() {
 
 #[test]
 fn clamping_without_continuation_is_rejected() {
-    // 3 cm from a wall of the furnace, b = 4: a third of the light comes from where G > b. What the right estimator makes of
-    // the same bound is in tests/bounded.rs.
+    // 3 cm from a wall of the furnace, b = 4: a third of the light comes from where G > b, by quadrature over the wall. What
+    // the right estimator makes of a bound there is in tests/bounded.rs.
     let case = Case::new(&point("unused", [0.0; 3], [0.0, 1.0, 0.0]), closed_box(DVec3::ONE, &lambert(0.5, 1.0 / PI)));
     let meter = meter(case.scene.place([0.03, 0.0, 0.5]), DVec3::Y);
     let clamped = estimate_bounded(&case, meter, 4.0, |_, _| ());
-    assert!((clamped.mean - 0.66).abs() < 0.02, "docs/method.md says 0.660: {clamped:?}");
+    assert!((clamped.mean - 0.66).abs() < 0.02, "by quadrature 0.660: {clamped:?}");
     assert!(verdict(&compare("clamped", clamped, 1.0), 1).is_some());
 }

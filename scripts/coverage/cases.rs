@@ -27,7 +27,7 @@ const SOBOLEV_A_1: f64 = 0.653442317194389;
 /// All cases, printed as they come.
 pub fn run(replicates: u64, mut done: impl FnMut(&[Counted])) -> Result<Vec<Counted>> {
     type Case = fn(u64) -> Result<Vec<Counted>>;
-    let cases: [Case; 17] = [
+    let cases: [Case; 19] = [
         |n| sobolev_a("rqmc", n),
         |n| sobolev_a("random", n),
         ulbricht_sphere,
@@ -41,6 +41,8 @@ pub fn run(replicates: u64, mut done: impl FnMut(&[Counted])) -> Result<Vec<Coun
         |n| glossy_floor(0.1, Lamp::Point, 32, n),
         |n| glossy_floor(0.3, Lamp::Point, 32, n),
         |n| glossy_floor(0.3, Lamp::Point, 128, n),
+        |n| varnished_floor(0.25, Lamp::Point, n),
+        |n| varnished_floor(0.25, Lamp::Ceiling, n),
         mirror_beside_an_edge,
         stopped_sobolev,
         |n| stopped_edge(true, n),
@@ -218,37 +220,61 @@ enum Lamp {
     Ceiling,
 }
 
-/// A cube with a glossy floor, seen in luminance at a slant, in 32 batches of `histories`.
+/// A half metallic floor, seen in luminance at a slant, in 32 batches of `histories`.
 fn glossy_floor(roughness: f64, lamp: Lamp, histories: u32, n: u64) -> Result<Vec<Counted>> {
+    let law = Reflectance::metallic_roughness(Colour::grey(0.8), 0.5, roughness);
+    let name = format!("glossy floor, roughness {roughness}, {}, rqmc, 32 x {histories}", lamp.name());
+    floor_case(&name, law, lamp, [[0.9, 0.3, 0.5], [0.3, 0.0, 0.45]], histories, n)
+}
+
+/// A dielectric whose lobe is no peak at normal incidence, seen 80 degrees from it, where it is one.
+fn varnished_floor(roughness: f64, lamp: Lamp, n: u64) -> Result<Vec<Counted>> {
+    let law = Reflectance::metallic_roughness(Colour::grey(0.6), 0.0, roughness);
+    let name = format!("varnished floor at 80 degrees, roughness {roughness}, {}, rqmc, 32 x 32", lamp.name());
+    floor_case(&name, law, lamp, [[0.95, 0.12, 0.5], [0.27, 0.0, 0.45]], 32, n)
+}
+
+/// A cube with a floor of its own, of which a pixel and a region are seen, and a lux-meter low on a wall.
+fn floor_case(
+    name: &str,
+    reflectance: Reflectance,
+    lamp: Lamp,
+    [eye, target]: [[f64; 3]; 2],
+    histories: u32,
+    n: u64,
+) -> Result<Vec<Counted>> {
     let mut model = closed_box(DVec3::ONE, &lambert(0.5, 0.0));
-    // closed_box adds the floor, y = 0, as its third quad.
-    model.surfaces[2] = Surface {
-        name: "floor".into(),
-        reflectance: Reflectance::metallic_roughness(Colour::grey(0.8), 0.5, roughness),
-        double_sided: false,
-        emission: Colour::BLACK,
-    };
-    let (source, name) = match lamp {
-        Lamp::Point => (omni([0.4, 0.6, 0.5], 100.0), "point lamp"),
+    // closed_box adds the floor, y = 0, as its third quad, and the ceiling as its fourth.
+    model.surfaces[2] = Surface { name: "floor".into(), reflectance, ..lambert(0.0, 0.0) };
+    let source = match lamp {
+        Lamp::Point => omni([0.4, 0.6, 0.5], 100.0),
         Lamp::Ceiling => {
-            // The ceiling, y = 1, is the fourth quad.
             model.surfaces[3] = lambert(0.5, 100.0);
-            (String::new(), "area light")
+            String::new()
         }
     };
     let job = tables("rqmc", 32, histories)
         + &source
-        + &camera("floor", [0.9, 0.3, 0.5], [0.3, 0.0, 0.45], 10.0, [2, 1])
-        + "[[region]]\nname = \"both\"\ncamera = \"floor\"\nrectangle = [0, 0, 2, 1]\n";
+        + &camera("floor", eye, target, 10.0, [2, 1])
+        + "[[region]]\nname = \"both\"\ncamera = \"floor\"\nrectangle = [0, 0, 2, 1]\n"
+        + &point("wall", [0.0, 0.05, 0.5], [1.0, 0.0, 0.0]);
     let experiment = Experiment::new(&job, model)?;
-    let wanted = [("L of a pixel", Kind::Total(0, 0)), ("region of 2 pixels", Kind::Total(1, 0))];
+    let wanted = [
+        ("L of a pixel", Kind::Total(0, 0)),
+        ("region of 2 pixels", Kind::Total(2, 0)),
+        ("E on a wall", Kind::Total(1, 0)),
+    ];
     let quantities = measured(&experiment, &wanted);
-    Ok(count(
-        &format!("glossy floor, roughness {roughness}, {name}, rqmc, 32 x {histories}"),
-        &experiment,
-        quantities,
-        n,
-    ))
+    Ok(count(name, &experiment, quantities, n))
+}
+
+impl Lamp {
+    fn name(self) -> &'static str {
+        match self {
+            Lamp::Point => "point lamp",
+            Lamp::Ceiling => "area light",
+        }
+    }
 }
 
 /// A cube with a mirror for a wall, and an edge that the mirror lights: that part of the light has no bound.

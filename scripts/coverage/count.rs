@@ -100,7 +100,7 @@ impl Counted {
         above && (self.quantity.kind.is_conservative() || (low <= 0.96 && coverage <= 0.97))
     }
 
-    /// Whether the mean is that of the truth; the least of several is biased by selection, and a stopped run by its stop.
+    /// Whether the mean is that of the truth; the least of several is biased by selection.
     fn mean_holds(&self) -> bool {
         let selected = matches!(self.quantity.kind, Kind::Minimum(_) | Kind::Uniformity(_));
         selected || self.z().abs() <= 3.0

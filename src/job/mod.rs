@@ -140,7 +140,8 @@ impl Default for Transport {
     }
 }
 
-/// The rule that turns histories into numbers. All estimate the same quantities.
+/// The rule that turns histories into numbers. All estimate the same quantities; light that a mirror sends straight to a
+/// receiver is missing from the first two and counted by the third.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Estimator {

@@ -5,9 +5,10 @@
 use super::values::{Bin, SetValues, Status};
 use crate::farm::merge::{Merged, SetResult};
 use crate::farm::plan::Plan;
-use crate::job::{ReceiverKind, SetShape};
+use crate::job::ReceiverKind;
 use crate::tally::derived::{Bounded, Family, Series, family_quantile, ratio};
-use crate::tally::statistics::{Estimate, student_quantile};
+use crate::tally::health::{Health, Mark, Signs, health};
+use crate::tally::statistics::{Estimate, student_quantile, variance_of_variance};
 use serde::Serialize;
 
 const MEAN: &str = "mean over the points in each batch, Student's interval over the batches";
@@ -30,6 +31,9 @@ pub(super) struct Quantity {
     pub how: &'static str,
     #[serde(skip_serializing_if = "str::is_empty")]
     pub note: &'static str,
+    /// Why the interval should not be trusted; empty when healthy.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub marks: Vec<&'static str>,
 }
 
 /// What is derived from one receiver set.
@@ -67,35 +71,76 @@ pub(super) struct OfRatio {
     pub quantity: Quantity,
 }
 
-/// What is derived from the set number `set` of the job.
-pub(super) fn of_set(plan: &Plan, merged: &Merged, set: usize, shape: &SetShape) -> OfSet {
+/// What is derived from the set number `set` of the job, with `values` and `health` of its mean.
+pub(super) fn of_set(plan: &Plan, merged: &Merged, set: usize, values: &SetValues, health: Health) -> OfSet {
     let SetResult::Replicates { scores, fixed_direct } = &merged.sets[set] else { return OfSet::default() };
     let confidence = plan.job.run.confidence;
     let family = Family::new(scores, fixed_direct);
-    match shape.kind {
+    match values.shape.kind {
         ReceiverKind::Region => {
-            OfSet { interval: Some(Quantity::of_mean(&family.mean(), confidence, REGION)), derived: None }
+            let mean = Quantity::of_mean(&family.mean(), confidence, REGION).marked(health);
+            OfSet { interval: Some(mean), derived: None }
         }
-        ReceiverKind::Grid => OfSet { interval: None, derived: Some(OfGrid::new(&family, merged.batches, confidence)) },
+        ReceiverKind::Grid => {
+            let of_grid = OfGrid::new(&family, merged.batches, confidence);
+            OfSet { interval: None, derived: Some(of_grid.marked(health, health_of_least(values))) }
+        }
         ReceiverKind::Camera | ReceiverKind::Gonio | ReceiverKind::Point => OfSet::default(),
     }
 }
 
-/// The ratios of the job, in its order.
-pub(super) fn ratios(plan: &Plan, merged: &Merged) -> Vec<OfRatio> {
+/// The marks of the mean over the bins of the set number `set`; of one bin they are its own.
+pub(super) fn health_of_mean(plan: &Plan, merged: &Merged, set: usize, values: &SetValues) -> Health {
+    let SetResult::Replicates { scores, fixed_direct } = &merged.sets[set] else { return Health::default() };
+    if let [bin] = &values.bins[..] {
+        return bin.health.unwrap_or_default();
+    }
+    let mean = Family::new(scores, fixed_direct).mean();
+    let estimate = mean.estimate();
+    let existing = || values.bins.iter().filter(|b| b.health.is_some());
+    let caustic = existing().map(|b| b.caustic).sum::<f64>() / existing().count() as f64;
+    let histories = (merged.batches * plan.job.run.histories_per_batch) as f64;
+    health(&Signs {
+        batches: merged.batches,
+        informed: !estimate.standard_error.is_nan(),
+        relative_error: if estimate.standard_error == 0.0 { 0.0 } else { estimate.relative_error() },
+        peak: f64::NAN,
+        vov: variance_of_variance(mean.scores.iter().copied()),
+        history_vov: f64::NAN,
+        slope: None,
+        failed_checks: 0,
+        caustic: caustic / estimate.standard_error,
+        histories_in_lobe: histories * plan.scene.narrowest_lobe * plan.scene.narrowest_lobe,
+    })
+}
+
+/// The marks of the bin with the least value.
+fn health_of_least(values: &SetValues) -> Health {
+    let existing = values.bins.iter().filter(|b| b.health.is_some());
+    let least = existing.min_by(|a, b| a.value.total_cmp(&b.value));
+    least.and_then(|bin| bin.health).unwrap_or_default()
+}
+
+/// The ratios of the job, in its order; `healths` are those of the means of its sets.
+pub(super) fn ratios(plan: &Plan, merged: &Merged, healths: &[Health]) -> Vec<OfRatio> {
     let shapes = plan.job.sets();
-    let series = |name: &str| {
+    let side = |name: &str| {
         let place = shapes.iter().position(|s| s.name == name).expect("a ratio of a checked job is one of its sets");
         match &merged.sets[place] {
-            SetResult::Replicates { scores, fixed_direct } => Family::new(scores, fixed_direct).mean(),
+            SetResult::Replicates { scores, fixed_direct } => {
+                (Family::new(scores, fixed_direct).mean(), healths[place])
+            }
             SetResult::Moments { .. } => unreachable!("a ratio of a checked job is one of sets that keep batches"),
         }
     };
-    let of_ratio = |r: &crate::job::Ratio| OfRatio {
-        name: r.name.clone(),
-        numerator: r.numerator.clone(),
-        denominator: r.denominator.clone(),
-        quantity: Quantity::of_ratio(&series(&r.numerator), &series(&r.denominator), plan.job.run.confidence),
+    let of_ratio = |r: &crate::job::Ratio| {
+        let ((above, its), (below, other)) = (side(&r.numerator), side(&r.denominator));
+        OfRatio {
+            name: r.name.clone(),
+            numerator: r.numerator.clone(),
+            denominator: r.denominator.clone(),
+            quantity: Quantity::of_ratio(&above, &below, plan.job.run.confidence).marked(its.and(other)),
+        }
     };
     plan.job.ratios.iter().map(of_ratio).collect()
 }
@@ -126,14 +171,19 @@ impl Quantity {
     fn new(estimate: Estimate, confidence: f64, how: &'static str, note: &'static str) -> Self {
         let (ci_lower, ci_upper) = estimate.interval(student_quantile(confidence, estimate.n));
         let standard_error = Some(estimate.standard_error);
-        Quantity { value: estimate.mean, standard_error, ci_lower, ci_upper, how, note }
+        Quantity { value: estimate.mean, standard_error, ci_lower, ci_upper, how, note, marks: Vec::new() }
     }
 
     fn of_least(least: Bounded, how: &'static str, note: &'static str) -> Self {
         let missing = least.low.is_nan() && note.is_empty();
         let note = if missing { "points without information" } else { note };
         let Bounded { value, low, high } = least;
-        Quantity { value, standard_error: None, ci_lower: low, ci_upper: high, how, note }
+        Quantity { value, standard_error: None, ci_lower: low, ci_upper: high, how, note, marks: Vec::new() }
+    }
+
+    /// The same with the marks of `health`.
+    fn marked(self, health: Health) -> Self {
+        Quantity { marks: health.marks().map(Mark::word).collect(), ..self }
     }
 }
 
@@ -148,6 +198,16 @@ impl OfGrid {
             mean: Quantity::of_mean(&mean, confidence, MEAN),
             min: Quantity::of_least(family.minimum(confidence), MINIMUM, note),
             uniformity: Quantity::of_least(family.uniformity(confidence), UNIFORMITY, of_ratio),
+        }
+    }
+
+    /// The same with the marks of the mean and of the least of the points.
+    fn marked(self, of_mean: Health, of_least: Health) -> Self {
+        OfGrid {
+            mean: self.mean.marked(of_mean),
+            min: self.min.marked(of_least),
+            uniformity: self.uniformity.marked(of_mean.and(of_least)),
+            ..self
         }
     }
 }

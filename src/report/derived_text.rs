@@ -50,7 +50,7 @@ fn ratio_line(ratio: &OfRatio) -> String {
 fn about(q: &Quantity, unit: &str) -> String {
     let half = 0.5 * (q.ci_upper - q.ci_lower);
     if half.is_finite() {
-        format!("{} +- {}{unit}", short(q.value, 4), short(half, 2))
+        format!("{} +- {}{unit}{}", short(q.value, 4), short(half, 2), marks(q))
     } else {
         format!("{}{unit} ({})", short(q.value, 4), reason(q))
     }
@@ -59,10 +59,15 @@ fn about(q: &Quantity, unit: &str) -> String {
 /// Value (from .. to).
 fn between(q: &Quantity) -> String {
     if q.ci_lower.is_finite() && q.ci_upper.is_finite() {
-        format!("{} ({} .. {})", short(q.value, 4), short(q.ci_lower, 4), short(q.ci_upper, 4))
+        format!("{} ({} .. {}){}", short(q.value, 4), short(q.ci_lower, 4), short(q.ci_upper, 4), marks(q))
     } else {
         format!("{} ({})", short(q.value, 4), reason(q))
     }
+}
+
+/// Why the interval should not be trusted; empty when healthy.
+fn marks(q: &Quantity) -> String {
+    if q.marks.is_empty() { String::new() } else { format!(" [marked: {}]", q.marks.join(", ")) }
 }
 
 fn reason(q: &Quantity) -> String {

@@ -1,14 +1,14 @@
 //! `summary.json`: what a whole receiver set says in a line, the flux balance, timings, and a digest by which two
 //! runs are compared. A number that is not finite is `null`.
 
-use super::derived::{OfRatio, OfSet, of_set, ratios};
+use super::derived::{OfRatio, OfSet, health_of_mean, of_set, ratios};
 use super::health::{Monitored, count_marks, count_unhealthy, estimate_label, is_plain, lines};
 use super::stopping::StoppedBy;
 use super::values::{Bin, SetValues, Status, kind_name, unit};
 use crate::farm::merge::Merged;
 use crate::farm::plan::{Input, Plan};
 use crate::tally::FLUX_BINS;
-use crate::tally::health::FEW_BATCHES;
+use crate::tally::health::{FEW_BATCHES, Health};
 use crate::tally::statistics::{Estimate, figure_of_merit, median, student_quantile};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -114,18 +114,24 @@ pub(super) struct Collector<'a> {
     merged: &'a Merged,
     sets: Vec<SetSummary>,
     monitored: Vec<Monitored>,
+    /// Of the means of the sets.
+    healths: Vec<Health>,
     hasher: blake3::Hasher,
 }
 
 impl<'a> Collector<'a> {
     /// Nothing gathered yet.
     pub fn new(plan: &'a Plan, merged: &'a Merged) -> Self {
-        Collector { plan, merged, sets: Vec::new(), monitored: Vec::new(), hasher: blake3::Hasher::new() }
+        let (sets, monitored, healths) = (Vec::new(), Vec::new(), Vec::new());
+        Collector { plan, merged, sets, monitored, healths, hasher: blake3::Hasher::new() }
     }
 
     /// Takes in the next receiver set in job order.
     pub fn add(&mut self, values: &SetValues) {
-        let derived = of_set(self.plan, self.merged, self.sets.len(), &values.shape);
+        let place = self.sets.len();
+        let health = health_of_mean(self.plan, self.merged, place, values);
+        let derived = of_set(self.plan, self.merged, place, values, health);
+        self.healths.push(health);
         self.sets.push(SetSummary::new(values, self.merged.seconds, derived));
         self.monitored.extend(Monitored::all(values));
         let shape = &values.shape;
@@ -163,7 +169,7 @@ impl<'a> Collector<'a> {
             estimate: estimate_label(plan),
             warnings: warnings(plan, merged, &flux, lines(&self.sets, &self.monitored)),
             sets: self.sets,
-            ratios: ratios(plan, merged),
+            ratios: ratios(plan, merged, &self.healths),
             monitored: self.monitored,
             flux_lm: flux,
             timings: Timings {

@@ -10,7 +10,7 @@ mod reflectance;
 mod source;
 
 pub use nodes::{Node, Nodes};
-pub use reflectance::{Reflectance, Scattered};
+pub use reflectance::{Reflectance, Scattered, weight_over_tolerated};
 pub use source::{Emission, Emitter, Light, Sources};
 
 use crate::error::{Error, Result};
@@ -138,7 +138,7 @@ impl Scene {
         let cameras = model.cameras.into_iter().map(|c| CameraNode { eye: c.eye + offset, ..c }).collect();
         let used = || surface_of.iter().map(|&s| &surfaces[s as usize].reflectance);
         let has_peaks = used().any(Reflectance::is_peaked);
-        let narrowest_lobe = used().filter_map(Reflectance::narrow_lobe).fold(1.0, f64::min);
+        let narrowest_lobe = used().map(Reflectance::lobe_width).fold(1.0, f64::min);
         let reflects = used().any(|r| !r.is_black());
         Ok(Scene {
             geometry,
@@ -190,8 +190,7 @@ impl Scene {
         self.has_peaks
     }
 
-    /// alpha of the narrowest lobe in which a surface reflects \[1\]: 0 where there is a mirror, 1 without any lobe that
-    /// is peaked.
+    /// alpha of the narrowest lobe in which a surface reflects \[1\]: 0 where there is a mirror, 1 where all are matt.
     pub fn narrowest_lobe(&self) -> f64 {
         self.narrowest_lobe
     }

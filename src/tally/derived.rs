@@ -35,9 +35,9 @@
 //! there is none, NaN. Fixed parts, the same in every batch, are added to means and have no error. What the bins
 //! measure, this module does not know.
 
-use super::Replicates;
 use super::statistics::{Estimate, student_quantile};
 use super::student::tail_quantile;
+use super::{Replicates, informed};
 
 /// One number a batch, and a constant that belongs to each of them.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,6 +46,8 @@ pub struct Series {
     pub scores: Vec<f64>,
     /// The part known without error.
     pub fixed: f64,
+    /// False when nothing is known about the error, see [`super::informed`].
+    pub informed: bool,
 }
 
 /// A value with an interval that is not symmetric about it, and so without standard error.
@@ -84,12 +86,12 @@ pub fn jackknife(n: usize, statistic: impl Fn(Option<usize>) -> f64) -> Estimate
     Estimate { n: n as u64, mean: statistic(None), standard_error }
 }
 
-/// The ratio of two means over the same batches. Its error is NaN where one of them never scored or the interval of
-/// the denominator at `confidence` contains zero.
+/// The ratio of two means over the same batches. Its error is NaN where nothing is known about that of one of them, or the
+/// interval of the denominator at `confidence` contains zero.
 pub fn ratio(numerator: &Series, denominator: &Series, confidence: f64) -> Estimate {
     assert_eq!(numerator.scores.len(), denominator.scores.len(), "series of the same batches");
     let mut ratio = LeaveOneOut::new(numerator).over(&LeaveOneOut::new(denominator));
-    if !numerator.scored() || !denominator.is_clear_of_zero(confidence) {
+    if !numerator.informed || !denominator.is_clear_of_zero(confidence) {
         ratio.standard_error = f64::NAN;
     }
     ratio
@@ -105,18 +107,9 @@ pub fn least(intervals: impl Iterator<Item = (f64, f64)>) -> (f64, f64) {
 }
 
 impl Series {
-    /// The mean over the batches. A series that never scored has no information: its error is NaN, never 0.
+    /// The mean over the batches; its error is NaN without information.
     pub fn estimate(&self) -> Estimate {
-        let mut estimate = Estimate::from_scores(self.scores.iter().copied()).shifted(self.fixed);
-        if !self.scored() {
-            estimate.standard_error = f64::NAN;
-        }
-        estimate
-    }
-
-    /// Whether any batch scored.
-    fn scored(&self) -> bool {
-        self.scores.iter().any(|&x| x != 0.0)
+        Estimate::from_scores(self.scores.iter().copied()).shifted(self.fixed).or_no_error(self.informed)
     }
 
     /// Whether the interval of the mean leaves zero out.
@@ -169,12 +162,16 @@ impl<'a> Family<'a> {
         self.members.is_empty()
     }
 
-    /// The mean over the bins, batch by batch.
+    /// The mean over the bins, batch by batch; something is known of it where a history reached any of them.
     pub fn mean(&self) -> Series {
         let count = self.members.len() as f64;
         let of_batch = |batch: &[f64]| self.members.iter().map(|&(bin, _)| batch[bin]).sum::<f64>() / count;
         let scores = self.scores.value.chunks_exact(self.scores.bins.max(1) as usize).map(of_batch).collect();
-        Series { scores, fixed: self.members.iter().map(|(_, fixed)| fixed).sum::<f64>() / count }
+        let bins = || self.members.iter().map(|&(bin, _)| bin);
+        let existed = bins().map(|bin| self.scores.existed[bin]).max().unwrap_or(0);
+        let peak = bins().map(|bin| self.scores.peak[bin]).fold(0.0, f64::max);
+        let fixed = self.members.iter().map(|(_, fixed)| fixed).sum::<f64>() / count;
+        Series { scores, fixed, informed: informed(existed, peak) }
     }
 
     /// The least of the means of the bins, by equation (11.6).
@@ -189,12 +186,9 @@ impl<'a> Family<'a> {
         let mean = self.mean();
         let denominator = LeaveOneOut::new(&mean);
         let share = |&(bin, fixed): &(usize, f64)| {
-            let series = Series { scores: self.scores.scores(bin).collect(), fixed };
-            let mut share = LeaveOneOut::new(&series).over(&denominator);
-            if !series.scored() {
-                share.standard_error = f64::NAN;
-            }
-            share
+            let informed = self.scores.informed(bin);
+            let series = Series { scores: self.scores.scores(bin).collect(), fixed, informed };
+            LeaveOneOut::new(&series).over(&denominator).or_no_error(informed)
         };
         let uniformity = self.bounded(confidence, self.members.iter().map(share));
         if mean.is_clear_of_zero(confidence) {

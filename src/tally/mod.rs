@@ -114,7 +114,7 @@ impl BatchScores {
 pub enum SetTally {
     /// Moments of batch scores, for maps.
     Moments(Moments),
-    /// Every batch's score, for grids and points.
+    /// Every batch's score, for grids, points and regions.
     Replicates(Replicates),
 }
 

@@ -1,4 +1,4 @@
-//! Every batch's score of every bin: moments of any order, and later the jackknife, come from these.
+//! Every batch's score of every bin: moments of any order and the jackknife come from these.
 
 use super::statistics::Estimate;
 use super::{Scores, informed};
@@ -94,7 +94,11 @@ impl Replicates {
 
     /// The estimate of one bin; its error is NaN without information, see [`informed`].
     pub fn estimate(&self, bin: usize) -> Estimate {
-        let estimate = Estimate::from_scores(self.scores(bin));
-        estimate.or_no_error(informed(self.existed[bin], self.peak[bin]))
+        Estimate::from_scores(self.scores(bin)).or_no_error(self.informed(bin))
+    }
+
+    /// Whether anything is known about the error of one bin, see [`informed`].
+    pub fn informed(&self, bin: usize) -> bool {
+        informed(self.existed[bin], self.peak[bin])
     }
 }

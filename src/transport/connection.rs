@@ -2,8 +2,9 @@
 //!
 //! One estimator for illuminance and luminance; see the equations in [`super`]. A connection of a vertex x to a
 //! receiver r carries the share min(1, b/(G s_x s_r)) of the light on its way, with G the geometric factor, s >= 1
-//! the peaks of the two laws of reflection in these directions (1 for matt ones) and b the bound of the kernel: so no
-//! history scores more than W b/pi^2 there. What is left reaches the receiver through [`super::continuation`], whose points
+//! the peaks of the two laws of reflection in these directions (1 where they are not peaked) and b the bound of the
+//! kernel: so a connection scores at most W b f_x f_r/(s_x s_r), with f/s = rho/pi of matt laws and at most 4/pi of peaked
+//! ones. What is left reaches the receiver through [`super::continuation`], whose points
 //! are receivers of the same owner. b is infinite for the plain local estimate, and for light that a delta
 //! scatterer sent to the vertex: no continuation could find it. How much that is, and how much comes by continuations, is
 //! summed beside, for the health of the result.
@@ -95,7 +96,7 @@ pub struct Link {
     pub receiver: Receiver,
 }
 
-/// What histories give one owner: sums over histories, not yet divided by their number. `mirrored` and `continued` are for
+/// What histories give one owner \[lx or cd/m2\]: sums over histories, not yet divided by their number. `mirrored` and `continued` are for
 /// [`Connected::unbounded`] alone.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Connected {

@@ -6,12 +6,14 @@
 //! that starts at the receiver carries the rest (docs/method.md, section 6):
 //!
 //! ```text
-//! q(x -> y) = min(1, b / (G(x,y) s_x s_y)),   s = max(1, pi f / 4) of a peaked law in these directions, else 1
+//! q(x -> y) = min(1, b / (G(x,y) s_x s_y)),   s = max(1, pi f / 4) where the law is peaked, else 1
 //!
 //! J   = sum_k T_k { 1{k>=1} D_k + sum_n W_n f(x_n) q(x_n -> y_k) G(x_n,y_k) g_k },   y_0 = receiver, T_0 = 1
 //! g_k = f(y_k; u -> y_{k-1}) (1 - q(y_k -> y_{k-1})),   g_0 = the response of the receiver
 //! T_{k+1} = T_k g_k |cos| / pdf
 //! ```
+//!
+//! At a vertex x a law is peaked if it is 60 degrees from the normal, at a receiver y if it is towards the eye.
 //!
 //! D_k is direct light reflected at y_k. Where y_k is matt, 1 - q is the factor (1 - b/G)_+ and the equations are
 //! those of the note on edges. Where it is peaked, q depends on the direction of the light that arrives at y_k, which is not known
@@ -54,7 +56,7 @@ pub struct Continuation {
 pub fn is_due(scene: &Scene, receiver: &Receiver, bound: f64) -> bool {
     bound.is_finite()
         && (scene.has_peaks()
-            || receiver.response.is_peaked(scene)
+            || receiver.response.is_peaked()
             || scene.geometry.may_exceed(receiver.position, receiver.normal, bound))
 }
 
@@ -73,9 +75,9 @@ pub fn continue_from(scene: &Scene, receiver: &Receiver, bound: f64, rng: &mut G
             }
             weight = weight / survival;
         }
-        let next = found.receiver(weight);
+        let next = found.receiver(scene, weight);
         path.direct.push(from_lights(scene, &next) + from_emitters(scene, &next, 1, rng));
-        if next.response.is_peaked(scene) {
+        if next.response.is_peaked() {
             path.caustic += from_lights_as_if_matt(scene, &next).luminance();
         }
         path.points.push(next);
@@ -89,16 +91,15 @@ struct Found {
     hit: Hit,
     /// From the surface back to where the step began.
     back: DVec3,
-    /// b/(G s) of the step.
+    /// b/(G s) of the step \[1\].
     carried: f64,
 }
 
 impl Found {
     /// The receiver of light that is reflected here and then counts with `weight`.
-    fn receiver(self, weight: Colour) -> Receiver {
+    fn receiver(self, scene: &Scene, weight: Colour) -> Receiver {
         let Found { hit, back, carried } = self;
-        let (primitive, attenuation) = (hit.primitive, weight);
-        let response = Response::Reflectance { primitive, to_eye: back, attenuation, carried };
+        let response = Response::reflectance(scene, (hit.primitive, hit.normal), back, weight, carried);
         Receiver { position: hit.position, normal: hit.normal, response }
     }
 }

@@ -14,7 +14,7 @@ use crate::random::Generator;
 use crate::scene::{Emitter, Scene};
 
 /// From this distance in lengths of its longest edge on, a triangle is sampled by area: the geometric factor then
-/// varies less than twofold over it, and the solid angle of a tiny triangle need not be computed.
+/// varies less than threefold over it, and the solid angle of a tiny triangle need not be computed.
 const FAR: f64 = 3.0;
 
 /// Area-light samples of one receiver and batch: proportional to the histories, so that no share of the variance
@@ -67,7 +67,7 @@ pub fn from_emitters(scene: &Scene, receiver: &Receiver, samples: u64, rng: &mut
         if let Some(sight) = Sight::new(emitter, probability, lifted) {
             sum += sample_emitter(scene, receiver, &sight, rng);
         }
-        if receiver.response.is_peaked(scene) {
+        if receiver.response.is_peaked() {
             sum += sample_response(scene, receiver, lifted, rng);
         }
     }
@@ -104,7 +104,7 @@ fn sample_response(scene: &Scene, receiver: &Receiver, from: DVec3, rng: &mut Ge
 
 /// Density of directions drawn from the response, 0 where it is not peaked and none are drawn \[1/sr\].
 fn density_of_response(scene: &Scene, receiver: &Receiver, w_in: DVec3) -> f64 {
-    let peaked = receiver.response.is_peaked(scene);
+    let peaked = receiver.response.is_peaked();
     if peaked { receiver.response.pdf(scene, receiver.normal, w_in) } else { 0.0 }
 }
 

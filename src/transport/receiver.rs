@@ -8,7 +8,7 @@ use crate::geometry::{Hit, Ray};
 use crate::math::{DVec3, PI, to_world};
 use crate::photometry::Colour;
 use crate::random::{Generator, cosine_hemisphere};
-use crate::scene::{Reflectance, Scene};
+use crate::scene::{Reflectance, Scene, weight_over_tolerated};
 
 /// Mirrors that an eye ray follows before it is given up; facing perfect mirrors would be followed for ever.
 const MAX_MIRRORS: u32 = 256;
@@ -38,12 +38,26 @@ pub enum Response {
         /// What the mirrors on the way to the eye reflect, over the probability of having followed them.
         attenuation: Colour,
         /// Of a point that continues another receiver: b/(G s) of the step between them. Connections to the other carry
-        /// the share min(1, carried/s) of light with the peak s here, see [`super::continuation`]. Else 0.
+        /// the share min(1, carried/s) of light with the peak s here, see [`super::continuation`]. Else 0 \[1\].
         carried: f64,
+        /// Whether the law has a narrow lobe towards l: connections to it alone would be spiky.
+        peaked: bool,
     },
 }
 
 impl Response {
+    /// Luminance of `primitive` with `normal` towards the eye, with the attenuation and the carried share given.
+    pub fn reflectance(
+        scene: &Scene,
+        (primitive, normal): (u32, DVec3),
+        to_eye: DVec3,
+        attenuation: Colour,
+        carried: f64,
+    ) -> Self {
+        let peaked = scene.surface(primitive).reflectance.is_peaked_at(to_eye.dot(normal));
+        Response::Reflectance { primitive, to_eye, attenuation, carried, peaked }
+    }
+
     /// The response where it does not depend on the direction of arrival: of lux-meters and Lambert surfaces.
     pub fn constant(&self, scene: &Scene) -> Option<Colour> {
         match self {
@@ -60,15 +74,15 @@ impl Response {
         self.with_peak(scene, normal, w_in).0
     }
 
-    /// The same, and how peaked it is there: 1 for lux-meters and for every law that is not peaked.
+    /// The same, and how peaked it is there: 1 for lux-meters and for every response that is not peaked.
     pub fn with_peak(&self, scene: &Scene, normal: DVec3, w_in: DVec3) -> (Colour, f64) {
         match self {
             Response::Cosine => (Colour::WHITE, 1.0),
-            Response::Reflectance { primitive, to_eye, attenuation, carried } => {
+            Response::Reflectance { primitive, to_eye, attenuation, carried, peaked } => {
                 let reflectance = &scene.surface(*primitive).reflectance;
                 let f = reflectance.evaluate(normal, w_in, *to_eye);
-                let peak = reflectance.peak(f);
-                (f * *attenuation * left(*carried, peak), peak)
+                let peak = if *peaked { weight_over_tolerated(f) } else { 1.0 };
+                (f * *attenuation * left(*carried, reflectance.peak(f)), peak)
             }
         }
     }
@@ -84,11 +98,8 @@ impl Response {
     }
 
     /// True when connections to a receiver with this response are spiky.
-    pub fn is_peaked(&self, scene: &Scene) -> bool {
-        match self {
-            Response::Cosine => false,
-            Response::Reflectance { primitive, .. } => scene.surface(*primitive).reflectance.is_peaked(),
-        }
+    pub fn is_peaked(&self) -> bool {
+        matches!(self, Response::Reflectance { peaked: true, .. })
     }
 
     /// Draws a direction out of a receiver with `normal`: the direction v, and response x cosine / density of light that
@@ -96,7 +107,7 @@ impl Response {
     pub fn sample(&self, scene: &Scene, normal: DVec3, rng: &mut Generator) -> Option<(DVec3, Colour)> {
         match self {
             Response::Cosine => Some((to_world(normal, cosine_hemisphere(rng.uniform2())), Colour::grey(PI))),
-            Response::Reflectance { primitive, to_eye, attenuation, carried } => {
+            Response::Reflectance { primitive, to_eye, attenuation, carried, .. } => {
                 let reflectance = &scene.surface(*primitive).reflectance;
                 // Laws are reciprocal: light sent back from the eye leaves in the directions that the eye receives.
                 let scattered = reflectance.sample(normal, -*to_eye, rng).filter(|s| !s.delta)?;
@@ -177,7 +188,7 @@ pub fn look_at(scene: &Scene, mut hit: Hit, mut direction: DVec3, rng: &mut Gene
 /// The receiver at `hit`, if the surface there reflects.
 fn receiver(scene: &Scene, hit: &Hit, direction: DVec3, attenuation: Colour) -> Option<Receiver> {
     let (primitive, to_eye) = (hit.primitive, -direction);
-    let response = Response::Reflectance { primitive, to_eye, attenuation, carried: 0.0 };
+    let response = Response::reflectance(scene, (primitive, hit.normal), to_eye, attenuation, 0.0);
     let reflects = !scene.surface(hit.primitive).reflectance.is_black();
     reflects.then_some(Receiver { position: hit.position, normal: hit.normal, response })
 }

@@ -158,6 +158,29 @@ fn the_terminal_shows_a_line_for_each_grid_region_and_ratio() {
 }
 
 #[test]
+fn what_is_derived_has_the_marks_of_what_it_is_derived_from() {
+    let (plan, result) = with_regions(10);
+    let s = summary(written(&plan, &result).path());
+    let desk = &s["sets"][2]["derived"];
+    for quantity in [&desk["mean"], &desk["min"], &desk["uniformity"], &s["sets"][4]["interval"], &s["ratios"][0]] {
+        assert_eq!(quantity["marks"][0], "few batches", "{quantity}");
+    }
+    assert!(report::text_summary(&plan, &result).contains(" cd/m2 [marked: few batches"));
+    // Half of the mean of the desk may come by a caustic: its interval is marked, and the ratio over it.
+    let (mut plan, mut result) = with_regions(20);
+    plan.scene.narrowest_lobe = 0.0;
+    let SetResult::Replicates { scores, .. } = &mut result.sets[2] else { panic!("the desk keeps its batches") };
+    scores.caustic[0] = 15.0;
+    let s = summary(written(&plan, &result).path());
+    let desk = &s["sets"][2]["derived"];
+    let marks = |quantity: &serde_json::Value| quantity["marks"].to_string();
+    for marked in [&desk["mean"], &desk["uniformity"], &s["ratios"][0], &s["ratios"][2]] {
+        assert!(marks(marked).contains("caustic"), "{marked}");
+    }
+    assert!(!marks(&s["sets"][4]["interval"]).contains("caustic"), "the region has none");
+}
+
+#[test]
 fn nothing_known_is_null_and_no_crash() {
     for n in [0, 1] {
         let (plan, result) = with_regions(n);

@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
 /// Bumped whenever the numbers of any job change.
-pub const NUMERICS: u32 = 2;
+pub const NUMERICS: u32 = 3;
 
 /// An input file, known by its content.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -43,7 +43,7 @@ pub struct SceneSummary {
     pub flux_lm: f64,
     /// Memory of geometry and acceleration structure \[bytes\].
     pub bytes: u64,
-    /// alpha of the narrowest lobe in which a surface reflects \[1\]: 0 where there is a mirror, 1 where none is peaked.
+    /// alpha of the narrowest lobe in which a surface reflects \[1\]: 0 where there is a mirror, 1 where all are matt.
     pub narrowest_lobe: f64,
     /// What was ignored or replaced, each with its effect.
     pub warnings: Vec<String>,

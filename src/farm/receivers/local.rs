@@ -10,7 +10,7 @@ use crate::photometry::Colour;
 use crate::random::Generator;
 use crate::scene::Scene;
 use crate::tally::{Scores, Watched};
-use crate::transport::connection::{Connected, Connectors, Link, Rule, TILE, Tile, connect};
+use crate::transport::connection::{Connected, Connectors, Link, Rule, Tile, connect};
 use crate::transport::continuation::{continue_from, is_due};
 use crate::transport::receiver::Receiver;
 use std::ops::Range;
@@ -93,7 +93,7 @@ impl ReceiverSet {
     }
 }
 
-/// Draws the next path of each of the `continued`: its points as tiles, one or more for each depth. Direct light at them is
+/// Draws the next path of each of the `continued`: its points as tiles, one for each depth: an owner has at most one point there. Direct light at them is
 /// added to `start`, one entry an owner, and its caustics to `caustic`: every history that the path serves has them.
 fn continue_all(
     scene: &Scene,
@@ -116,12 +116,7 @@ fn continue_all(
             }
         }
     }
-    let numbered = of_depth.into_iter().zip(1..);
-    numbered.flat_map(|(links, depth)| tiles_of(scene, links, depth)).collect()
-}
-
-fn tiles_of(scene: &Scene, links: Vec<Link>, depth: u32) -> Vec<Tile> {
-    links.chunks(TILE).map(|links| Tile::new(scene, links.to_vec(), depth)).collect()
+    of_depth.into_iter().zip(1..).map(|(links, depth)| Tile::new(scene, links, depth)).collect()
 }
 
 impl TileScores {

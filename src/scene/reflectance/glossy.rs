@@ -70,6 +70,8 @@ pub struct Glossy {
     /// `under` / (pi (1 - <a>)).
     diffuse: Colour,
     specular: Specular,
+    /// Whether connections from it are spiky.
+    peaked: bool,
 }
 
 impl Glossy {
@@ -86,7 +88,9 @@ impl Glossy {
             through if through > 1e-9 => u / (PI * through),
             _ => 0.0,
         });
-        Glossy { base, metallic, f0, under, diffuse, specular }
+        let mut law = Glossy { base, metallic, f0, under, diffuse, specular, peaked: false };
+        law.peaked = law.is_peaked_at(super::PEAKED_COSINE);
+        law
     }
 
     /// The same material in one photometric channel.
@@ -190,18 +194,21 @@ impl Glossy {
         matches!(self.specular, Specular::Mirror)
     }
 
-    /// pi f = F0 / (4 alpha^2) above the tolerated at normal incidence.
     pub(super) fn is_peaked(&self) -> bool {
-        match &self.specular {
-            Specular::Mirror => false,
-            Specular::Rough(facets, _) => self.f0.luminance() > 4.0 * super::PEAK * facets.alpha() * facets.alpha(),
-        }
+        self.peaked
     }
 
-    pub(super) fn narrow_lobe(&self) -> Option<f64> {
+    /// pi f of the pair mirrored at the cosine `mu`, F(mu) / (4 alpha^2 mu t(mu)), is above the tolerated.
+    pub(super) fn is_peaked_at(&self, mu: f64) -> bool {
+        let Specular::Rough(facets, _) = &self.specular else { return false };
+        let alpha2 = facets.alpha() * facets.alpha();
+        self.fresnel(mu).luminance() > 4.0 * super::PEAK * alpha2 * mu * facets.stretched(mu)
+    }
+
+    pub(super) fn lobe_width(&self) -> f64 {
         match &self.specular {
-            Specular::Mirror => Some(0.0),
-            Specular::Rough(facets, _) => self.is_peaked().then(|| facets.alpha()),
+            Specular::Mirror => 0.0,
+            Specular::Rough(facets, _) => facets.alpha(),
         }
     }
 

@@ -18,6 +18,9 @@ use glossy::Glossy;
 
 /// pi f from which on a law counts as peaked: a connection may then weigh this many times one to a white matt surface.
 const PEAK: f64 = 4.0;
+/// Cosine of the angle, 60 degrees, at which it is decided whether vertices of a law are spiky: nearer to grazing every
+/// lobe is, and light comes from there more and more rarely. Chosen by coverage (docs/coverage.md).
+const PEAKED_COSINE: f64 = 0.5;
 
 /// How a surface reflects.
 #[derive(Clone, Debug)]
@@ -131,8 +134,8 @@ impl Reflectance {
         }
     }
 
-    /// True when the finite part has a lobe so narrow that connections alone would be spiky: its pi f exceeds 4 where a
-    /// direction at normal incidence is mirrored.
+    /// True when the finite part has a lobe so narrow that connections from it alone would be spiky: its pi f exceeds 4 where
+    /// a direction 60 degrees from the normal is mirrored.
     pub fn is_peaked(&self) -> bool {
         match self {
             Reflectance::Lambert(_) => false,
@@ -140,18 +143,27 @@ impl Reflectance {
         }
     }
 
-    /// alpha of the lobe where it is peaked, 0 of a delta component; `None` of laws without either \[1\].
-    pub fn narrow_lobe(&self) -> Option<f64> {
+    /// The same where a direction at `cosine` from the normal is mirrored: towards grazing directions every lobe grows a
+    /// peak.
+    pub fn is_peaked_at(&self, cosine: f64) -> bool {
         match self {
-            Reflectance::Lambert(_) => None,
-            Reflectance::Glossy(law) => law.narrow_lobe(),
+            Reflectance::Lambert(_) => false,
+            Reflectance::Glossy(law) => law.is_peaked_at(cosine),
         }
     }
 
-    /// How many times the tolerated weight a connection with this value of `f` has: at least 1, and 1 for every law that
-    /// is not peaked.
+    /// alpha of the lobe: 0 of a delta component, 1 of a matt surface \[1\].
+    pub fn lobe_width(&self) -> f64 {
+        match self {
+            Reflectance::Lambert(_) => 1.0,
+            Reflectance::Glossy(law) => law.lobe_width(),
+        }
+    }
+
+    /// How many times the tolerated weight a connection from a vertex with this value of `f` has: at least 1, and 1 for
+    /// every law that is not peaked.
     pub fn peak(&self, f: Colour) -> f64 {
-        if self.is_peaked() { (PI / PEAK * f.luminance()).max(1.0) } else { 1.0 }
+        if self.is_peaked() { weight_over_tolerated(f) } else { 1.0 }
     }
 
     /// The same law with every colour replaced by its luminance, for one photometric channel. Exact for grey
@@ -162,6 +174,11 @@ impl Reflectance {
             Reflectance::Glossy(law) => Reflectance::Glossy(Box::new(law.grey())),
         }
     }
+}
+
+/// How many times the tolerated weight a connection with this value of `f` has, at least 1.
+pub fn weight_over_tolerated(f: Colour) -> f64 {
+    (PI / PEAK * f.luminance()).max(1.0)
 }
 
 /// True when light arrives and leaves on the side of `normal`.

@@ -132,6 +132,11 @@ impl Health {
         self.0 & mark.code() != 0
     }
 
+    /// The marks of both.
+    pub fn and(self, other: Health) -> Health {
+        Health(self.0 | other.0)
+    }
+
     /// The marks that are set.
     pub fn marks(self) -> impl Iterator<Item = Mark> {
         Mark::ALL.into_iter().filter(move |&mark| self.has(mark))
