@@ -3,8 +3,11 @@
 
 mod common;
 
-use common::scenes::{add_quad, closed_box, lambert, point, spot_camera};
-use common::{Case, Comparison, Estimate, assert_all, compare};
+use common::scenes::{
+    PLAIN, add_quad, closed_box, cube_with_floor, cube_with_mirrors, integrating_sphere, lambert, omni, point,
+    spot_camera,
+};
+use common::{Case, Comparison, Estimate, assert_all, compare, difference};
 use lampyris::math::{DVec3, PI, atan2};
 use lampyris::photometry::Colour;
 use lampyris::scene::{Light, Model, Reflectance, Surface};
@@ -18,11 +21,7 @@ fn run(histories: u32, batches: u32) -> String {
 }
 
 fn plain(job: &str) -> String {
-    job.to_owned() + "[transport]\nbounded = false\n"
-}
-
-fn omni(position: [f64; 3], intensity: f64) -> String {
-    format!("[[source]]\nkind = \"omni\"\nposition = {position:?}\nintensity = {intensity}\n")
+    job.to_owned() + PLAIN
 }
 
 /// What histories and continuations give the first bin of every set, direct light at the receiver left out.
@@ -34,11 +33,7 @@ fn indirect(case: &Case, orders: Range<u32>) -> Vec<Estimate> {
 
 /// The estimates `a` against the references `b` of the same quantities, which have errors of their own.
 fn differences(name: &str, a: &[Estimate], b: &[Estimate]) -> Vec<Comparison> {
-    let difference = |(i, (a, b)): (usize, (&Estimate, &Estimate))| {
-        let standard_error = (a.standard_error * a.standard_error + b.standard_error * b.standard_error).sqrt();
-        compare(format!("{name} {i}"), Estimate { standard_error, ..*a }, b.mean)
-    };
-    a.iter().zip(b).enumerate().map(difference).collect()
+    a.iter().zip(b).enumerate().map(|(i, (a, b))| difference(format!("{name} {i}"), *a, *b)).collect()
 }
 
 /// Variance of the batch scores.
@@ -119,7 +114,7 @@ fn an_open_corner_has_the_form_factor_of_its_wall() {
 
 #[test]
 fn in_an_integrating_sphere_nothing_is_bounded_and_no_bit_changes() {
-    let scene = "[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nfacing = \"inward\"\nreflectance = 0.5\n".to_owned()
+    let scene = integrating_sphere(0.5)
         + &omni([0.4, 0.0, 0.0], 100.0)
         + &point("pole", [0.0, 1.0, 0.0], [0.0, -1.0, 0.0])
         + &spot_camera("seen", [0.0, 0.1, 0.0], [0.6, 0.0, 0.8], [0.0, 1.0, 0.0]);
@@ -133,12 +128,8 @@ fn in_an_integrating_sphere_nothing_is_bounded_and_no_bit_changes() {
 
 /// A closed unit cube with a dielectric floor of `roughness`, whose ceiling emits `luminance`.
 fn cube_with_peaked_floor(roughness: f64, luminance: f64) -> Model {
-    let mut model = closed_box(DVec3::ONE, &lambert(0.6, 0.0));
-    let reflectance = Reflectance::metallic_roughness(Colour::grey(0.6), 0.0, roughness);
-    assert!(reflectance.is_peaked());
-    // closed_box adds floor and ceiling as its third and fourth quads.
-    model.surfaces[2] = Surface { reflectance, ..lambert(0.0, 0.0) };
-    model.surfaces[3] = lambert(0.6, luminance);
+    let model = cube_with_floor(roughness, 0.0, luminance);
+    assert!(model.surfaces[2].reflectance.is_peaked());
     model
 }
 
@@ -239,11 +230,8 @@ fn the_bound_takes_the_spikes_of_peaks_and_edges_away() {
 
 #[test]
 fn light_that_comes_over_mirrors_is_neither_lost_nor_counted_twice() {
-    // A mirror wall at x = 0, a polished floor, and meters beside the corner of floor and the matt wall x = 1.
-    let mut model = closed_box(DVec3::ONE, &lambert(0.5, 0.0));
-    let law = |base, metallic| Reflectance::metallic_roughness(Colour::grey(base), metallic, 0.0);
-    model.surfaces[0] = Surface { reflectance: law(0.9, 1.0), ..lambert(0.0, 0.0) };
-    model.surfaces[2] = Surface { reflectance: law(0.6, 0.0), ..lambert(0.0, 0.0) };
+    // Meters beside the corner of the polished floor and the matt wall x = 1.
+    let model = cube_with_mirrors(0.0);
     let job = run(128, 1024)
         + &omni([0.4, 0.6, 0.5], 10.0)
         + &point("wall", [1.0, 0.15, 0.4], [-1.0, 0.0, 0.0])

@@ -3,15 +3,18 @@
 
 mod common;
 
-use common::scenes::{add_quad, closed_box, lambert, point, sobolev, spot_camera};
-use common::{Case, Comparison, Estimate, assert_all, compare, estimates, flux, number, table};
+use common::scenes::{
+    add_quad, box_walls, closed_box, cube_with_floor, cube_with_mirrors, integrating_sphere, lambert, mirror, omni,
+    point, sobolev, spot_camera,
+};
+use common::{Case, Comparison, Estimate, assert_all, compare, difference, estimates, flux, number, table};
 use lampyris::farm::realization::Realization;
 use lampyris::math::{DVec3, PI};
 use lampyris::photometry::Colour;
 use lampyris::scene::{Model, Reflectance, Surface};
 use lampyris::tally::{BatchScores, Scores};
 
-/// The run of one estimator: the plain local estimate, or `reverse` or `direct_simulation`.
+/// The run of one estimator: `local`, whose kernel is bounded, `reverse` or `direct_simulation`.
 fn run(estimator: &str, histories: u32, batches: u32) -> String {
     format!(
         "[run]\nhistories_per_batch = {histories}\nbatches = {batches}\nseed = 61\n\
@@ -19,20 +22,14 @@ fn run(estimator: &str, histories: u32, batches: u32) -> String {
     )
 }
 
-fn omni(position: [f64; 3], intensity: f64) -> String {
-    format!("[[source]]\nkind = \"omni\"\nposition = {position:?}\nintensity = {intensity}\n")
-}
-
-/// The estimate `a` against the reference `b` that has an error of its own.
-fn difference(name: String, a: Estimate, b: Estimate) -> Comparison {
-    let standard_error = (a.standard_error * a.standard_error + b.standard_error * b.standard_error).sqrt();
-    compare(name, Estimate { standard_error, ..a }, b.mean)
-}
-
 /// Local against reverse estimation of every bin that `job` asks for in `model`, with (histories, batches) each.
 fn local_against_reverse(model: &Model, job: &str, runs: [(u32, u32); 2]) -> Vec<Comparison> {
     let all = |estimator, (histories, batches)| Case::new(&(run(estimator, histories, batches) + job), model.clone());
-    let (local, reverse) = (all("local", runs[0]), all("reverse", runs[1]));
+    against(&all("local", runs[0]), &all("reverse", runs[1]))
+}
+
+/// Every bin of `local` against the same bin of `reverse`.
+fn against(local: &Case, reverse: &Case) -> Vec<Comparison> {
     let names = local.job.sets().into_iter().map(|s| s.name);
     let pairs = names.zip(local.estimates().into_iter().zip(reverse.estimates()));
     let of_set = |(name, (a, b)): (String, (Vec<Estimate>, Vec<Estimate>))| {
@@ -68,6 +65,13 @@ fn room_receivers() -> String {
 fn local_and_reverse_agree_in_a_room_with_a_column() {
     let job = omni([2.5, 2.4, 1.6], 80.0) + &room_receivers();
     assert_all(&local_against_reverse(&room(), &job, [(4096, 64), (2048, 64)]));
+}
+
+#[test]
+fn the_plain_local_estimate_agrees_with_reverse_too() {
+    let job = omni([2.5, 2.4, 1.6], 80.0) + &room_receivers();
+    let plain = Case::new(&(run("local", 4096, 64) + "bounded = false\n" + &job), room());
+    assert_all(&against(&plain, &Case::new(&(run("reverse", 2048, 64) + &job), room())));
 }
 
 #[test]
@@ -118,9 +122,8 @@ fn local_and_reverse_agree_between_open_planes() {
 
 /// Ulbricht's sphere, R = 1 m: E = E_0 + rho Phi / (4 pi R^2 (1 - rho)), whatever the place of the lamp.
 fn ulbricht(estimator: &str) -> (Vec<Estimate>, [f64; 3]) {
-    let sphere = "[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nfacing = \"inward\"\nreflectance = 0.5\n";
     let job = run(estimator, 1024, 64)
-        + sphere
+        + &integrating_sphere(0.5)
         + &omni([0.4, 0.0, 0.0], 100.0)
         + &point("g0", [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0])
         + &point("g180", [-1.0, 0.0, 0.0], [1.0, 0.0, 0.0])
@@ -177,15 +180,6 @@ fn reverse_gives_the_exact_values_of_sobolevs_problem() {
     assert_all(&rows.iter().enumerate().map(at).collect::<Vec<_>>());
 }
 
-/// A closed cube of Lambert walls with a GGX floor.
-fn cube_with_glossy_floor(roughness: f64, metallic: f64) -> Model {
-    let mut model = closed_box(DVec3::ONE, &lambert(0.6, 0.0));
-    let reflectance = Reflectance::metallic_roughness(Colour::grey(0.6), metallic, roughness);
-    model.surfaces[2] = Surface { reflectance, ..lambert(0.0, 0.0) };
-    model.surfaces[3] = lambert(0.6, 20.0);
-    model
-}
-
 #[test]
 fn local_and_reverse_agree_on_a_glossy_floor_seen_by_an_eye() {
     // Far from the edges, seen steeply and flat; the floor of roughness 0.3 and 0.1, a dielectric.
@@ -193,7 +187,7 @@ fn local_and_reverse_agree_on_a_glossy_floor_seen_by_an_eye() {
         + &spot_camera("flat", [0.2, 0.3, 0.4], [0.6, 0.0, 0.5], [0.0, 1.0, 0.0]);
     let mut all = Vec::new();
     for (roughness, histories) in [(0.3, [(16384, 64), (1024, 64)]), (0.1, [(65536, 64), (1024, 64)])] {
-        let compared = local_against_reverse(&cube_with_glossy_floor(roughness, 0.0), &job, histories);
+        let compared = local_against_reverse(&cube_with_floor(roughness, 0.0, 20.0), &job, histories);
         all.extend(compared.into_iter().map(|c| Comparison { name: format!("{roughness} {}", c.name), ..c }));
     }
     assert_all(&all);
@@ -201,13 +195,9 @@ fn local_and_reverse_agree_on_a_glossy_floor_seen_by_an_eye() {
 
 #[test]
 fn local_and_reverse_agree_on_light_that_comes_over_mirrors() {
-    // A box with a mirror wall and a polished, half mirroring floor: what a mirror sends straight to the receiver is in
-    // neither estimate, what it sends to the surface before is in both. Only an area light can be found behind mirrors.
-    let mut model = closed_box(DVec3::ONE, &lambert(0.5, 0.0));
-    let law = |base, metallic| Reflectance::metallic_roughness(Colour::grey(base), metallic, 0.0);
-    model.surfaces[0] = Surface { reflectance: law(0.9, 1.0), ..lambert(0.0, 0.0) };
-    model.surfaces[2] = Surface { reflectance: law(0.6, 0.0), ..lambert(0.0, 0.0) };
-    model.surfaces[3] = lambert(0.5, 20.0);
+    // What a mirror sends straight to the receiver is in neither estimate, what it sends to the surface before is in both.
+    // Only an area light can be found behind mirrors.
+    let model = cube_with_mirrors(20.0);
     let job = point("air", [0.5, 0.5, 0.5], [-1.0, 0.2, 0.1])
         + &point("floor", [0.6, 0.0, 0.5], [0.0, 1.0, 0.0])
         + &spot_camera("wall", [0.5, 0.5, 0.5], [1.0, 0.4, 0.6], [0.0, 1.0, 0.0])
@@ -221,9 +211,7 @@ fn local_and_reverse_agree_on_light_that_comes_over_mirrors() {
 fn reverse_misses_what_a_lamp_without_extent_sends_over_a_mirror() {
     // Lamp -> mirror floor -> wall -> meter: the local estimate follows it, no shadow ray of a reverse path can.
     let mut model = Model::default();
-    let reflectance = Reflectance::metallic_roughness(Colour::WHITE, 1.0, 0.0);
-    let floor = Surface { reflectance, ..lambert(0.0, 0.0) };
-    add_quad(&mut model, DVec3::new(-9.0, 0.0, -9.0), DVec3::Z * 18.0, DVec3::X * 18.0, floor);
+    add_quad(&mut model, DVec3::new(-9.0, 0.0, -9.0), DVec3::Z * 18.0, DVec3::X * 18.0, mirror(1.0));
     add_quad(&mut model, DVec3::new(2.0, 0.0, -2.0), DVec3::Z * 4.0, DVec3::Y * 3.0, lambert(0.6, 0.0));
     let job = omni([0.0, 1.0, 0.0], 100.0) + &point("meter", [0.5, 1.5, 0.0], [1.0, 0.0, 0.0]);
     let indirect = |estimator| {
@@ -278,15 +266,7 @@ fn direct_simulation_counts_every_arrival_on_the_walls_of_a_closed_box_once() {
     // near an edge that it counts twice or not at all.
     let rho = 0.6;
     let size = DVec3::new(3.0, 2.0, 2.5);
-    let (x, y, z) = (DVec3::X * size.x, DVec3::Y * size.y, DVec3::Z * size.z);
-    let walls = [
-        ([DVec3::ZERO, y, z, DVec3::X], y.length() * z.length()),
-        ([x, y, z, DVec3::NEG_X], y.length() * z.length()),
-        ([DVec3::ZERO, z, x, DVec3::Y], z.length() * x.length()),
-        ([y, z, x, DVec3::NEG_Y], z.length() * x.length()),
-        ([DVec3::ZERO, x, y, DVec3::Z], x.length() * y.length()),
-        ([z, x, y, DVec3::NEG_Z], x.length() * y.length()),
-    ];
+    let walls = box_walls(size).map(|[origin, u, v]| ([origin, u, v, u.cross(v).normalize()], u.cross(v).length()));
     let mut job = run("direct_simulation", 2048, 32) + &omni([1.1, 0.9, 0.7], 50.0);
     for (i, (wall, _)) in walls.iter().enumerate() {
         job += &(grid(&format!("wall{i}"), *wall, 7, 5) + "monitor = [[3, 2]]\n");
@@ -315,11 +295,12 @@ fn direct_simulation_counts_every_arrival_on_the_walls_of_a_closed_box_once() {
 #[test]
 fn direct_simulation_counts_only_what_comes_from_the_side_of_the_normal() {
     // A grid in the air of Ulbricht's sphere: reflected light comes from both sides, the lamp's own from one.
-    let sphere = "[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nfacing = \"inward\"\nreflectance = 0.5\n";
     let lit = |normal: DVec3| {
         let corners = [DVec3::new(-0.2, 0.1, -0.2), DVec3::X * 0.4, DVec3::Z * 0.4, normal];
-        let job =
-            run("direct_simulation", 4096, 32) + sphere + &omni([0.0, -0.5, 0.0], 100.0) + &grid("g", corners, 1, 1);
+        let job = run("direct_simulation", 4096, 32)
+            + &integrating_sphere(0.5)
+            + &omni([0.0, -0.5, 0.0], 100.0)
+            + &grid("g", corners, 1, 1);
         let (_, batches) = Case::new(&job, Model::default()).batches(0..u32::MAX);
         let direct = batches.iter().map(|b| b.sets[0].direct[0]).sum::<f64>();
         (estimates(&batches)[0][0], direct)

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::scenes::{add_quad, closed_box, lambert, point, spot_camera};
+use common::scenes::{add_quad, closed_box, lambert, omni, point, spot_camera};
 use common::{Case, assert_all, compare};
 use lampyris::job::SetShape;
 use lampyris::math::{DVec3, PI};
@@ -12,10 +12,6 @@ use lampyris::tally::{SetTally, Tally};
 
 fn run(histories: u32, batches: u32) -> String {
     format!("[run]\nhistories_per_batch = {histories}\nbatches = {batches}\nseed = 71\n")
-}
-
-fn omni(position: [f64; 3], intensity: f64) -> String {
-    format!("[[source]]\nkind = \"omni\"\nposition = {position:?}\nintensity = {intensity:?}\n")
 }
 
 /// Tallies of all batches of `case`.

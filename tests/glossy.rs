@@ -4,7 +4,7 @@
 mod common;
 
 use common::scenes::{add_quad, closed_box, lambert, point, spot_camera};
-use common::{Case, Comparison, Estimate, assert_all, compare};
+use common::{Case, Estimate, assert_all, compare, difference};
 use lampyris::geometry::Ray;
 use lampyris::math::{DVec3, PI, to_world};
 use lampyris::photometry::Colour;
@@ -62,12 +62,6 @@ fn backward_estimates(scene: &Scene, eye: DVec3, target: DVec3, orders: usize) -
         })
         .collect();
     (0..orders).map(|n| Estimate::from_scores(scores.iter().map(|s| s[n]))).collect()
-}
-
-/// The estimate `a` against the reference `b` that has an error of its own.
-fn difference(name: String, a: Estimate, b: Estimate) -> Comparison {
-    let standard_error = (a.standard_error * a.standard_error + b.standard_error * b.standard_error).sqrt();
-    compare(name, Estimate { standard_error, ..a }, b.mean)
 }
 
 #[test]

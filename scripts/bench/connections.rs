@@ -3,15 +3,15 @@
 //! Receivers are the pixels of a camera, connected to the vertices of one batch, visibility and sums included.
 //! Times are CPU time of the thread, medians of several runs; on a shared machine compare interleaved runs only.
 
+mod common;
+
+use common::{load, prepare, thread_time};
 use lampyris::farm::pilot::bounds;
 use lampyris::farm::realization::Realization;
-use lampyris::job::Job;
 use lampyris::random::sobol::PointSet;
 use lampyris::random::{Domain, Stream};
-use lampyris::scene::{Model, Scene, gltf};
+use lampyris::tally::statistics;
 use lampyris::transport::trajectory::{Vertex, trace};
-use nix::time::{ClockId, clock_gettime};
-use std::time::Duration;
 
 const RUNS: usize = 7;
 const HISTORIES: u64 = 64;
@@ -32,8 +32,7 @@ fn bench(name: &str, side: u32) {
         "scene = \"{name}.glb\"\n[run]\nhistories_per_batch = {HISTORIES}\n[[camera]]\nname = \"view\"\n\
          node = \"{camera}\"\nwidth = {side}\nheight = {side}\npixel_samples = 1\n"
     );
-    let job = Job::parse(&text, "bench").expect("the job is right");
-    let scene = Scene::new(load(name), &job).expect("the scene is right");
+    let (job, scene) = prepare(&text, load(name));
     let mut vertices: Vec<Vertex> = Vec::new();
     let trajectories = Stream::new(job.run.seed, Domain::Trajectory, "");
     let per_history = median(|| {
@@ -79,19 +78,6 @@ fn points() {
     }
 }
 
-fn load(name: &str) -> Model {
-    let path = format!("{}/scenes/{name}.glb", env!("CARGO_MANIFEST_DIR"));
-    let bytes = std::fs::read(&path).expect("the scene ships with the project");
-    gltf::load(name, &bytes, &mut |uri| panic!("{uri}: the scene is one file")).expect("the scene is right")
-}
-
 fn median(mut run: impl FnMut() -> f64) -> f64 {
-    let mut times: Vec<f64> = (0..RUNS).map(|_| run()).collect();
-    times.sort_by(f64::total_cmp);
-    times[RUNS / 2]
-}
-
-/// CPU time of this thread.
-fn thread_time() -> Duration {
-    clock_gettime(ClockId::CLOCK_THREAD_CPUTIME_ID).expect("Linux has this clock").into()
+    statistics::median((0..RUNS).map(|_| run()))
 }

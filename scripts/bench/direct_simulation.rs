@@ -8,14 +8,15 @@
 //! illuminance in the middle: of direct light exactly and for every element, of reflected light by a longer local
 //! estimate for one element in each half metre. Elements that the column cuts are left out of it.
 
+mod common;
+
+use common::{load, prepare, thread_time};
 use lampyris::farm::pilot::bounds;
 use lampyris::farm::realization::Realization;
 use lampyris::job::Job;
-use lampyris::scene::{Model, Scene, gltf};
+use lampyris::scene::Scene;
 use lampyris::tally::statistics::{Estimate, figure_of_merit};
 use lampyris::tally::{BatchScores, MomentBlock};
-use nix::time::{ClockId, clock_gettime};
-use std::time::Duration;
 
 /// Sides of the elements \[m\].
 const SIZES: [f64; 4] = [0.5, 0.25, 0.125, 0.0625];
@@ -57,8 +58,7 @@ impl Case {
             "scene = \"room.glb\"\n[run]\nhistories_per_batch = {histories}\nbatches = {BATCHES}\n\
              [transport]\nestimator = \"{estimator}\"\n{receivers}"
         );
-        let job = Job::parse(&text, "bench").expect("the job is right");
-        let scene = Scene::new(room(), &job).expect("the scene is right");
+        let (job, scene) = prepare(&text, load("room"));
         Case { job, scene }
     }
 
@@ -189,15 +189,4 @@ fn bin_bytes() -> f64 {
 
 fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
-}
-
-fn room() -> Model {
-    let path = format!("{}/scenes/room.glb", env!("CARGO_MANIFEST_DIR"));
-    let bytes = std::fs::read(&path).expect("the scene ships with the project");
-    gltf::load("room", &bytes, &mut |uri| panic!("{uri}: the scene is one file")).expect("the scene is right")
-}
-
-/// CPU time of this thread.
-fn thread_time() -> Duration {
-    clock_gettime(ClockId::CLOCK_THREAD_CPUTIME_ID).expect("Linux has this clock").into()
 }

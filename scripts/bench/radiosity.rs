@@ -13,6 +13,9 @@
 //! centre, all of them kept, Gauss-Seidel until no value changes by more than 1e-3 of itself. Points on the border of two
 //! patches take the value of the one with the larger coordinates.
 
+mod common;
+
+use common::{prepare, thread_time};
 use lampyris::farm::pilot::bounds;
 use lampyris::farm::realization::Realization;
 use lampyris::job::Job;
@@ -22,8 +25,6 @@ use lampyris::scene::{Model, Scene};
 use lampyris::transport::trajectory::{Vertex, trace};
 use lampyris::validate::reference;
 use libm::j0;
-use nix::time::{ClockId, clock_gettime};
-use std::time::Duration;
 
 const HEIGHT: f64 = 0.5;
 const RHO: f64 = 0.5;
@@ -232,8 +233,7 @@ fn local(sampling: &str, roulette: &str, count: u64, runs: u64, exact: &[f64]) {
     // One row of 31 cells whose centres are the points.
     text += "[[grid]]\nname = \"e\"\norigin = [-0.05, 0, 0]\nu = [3.1, 0, 0]\nv = [0, 0, 1e-9]\nnormal = [0, 1, 0]\n\
              columns = 31\nrows = 1\n";
-    let job = Job::parse(&text, "bench").expect("the job is right");
-    let scene = Scene::new(Model::default(), &job).expect("the scene is right");
+    let (job, scene) = prepare(&text, Model::default());
     let realization = Realization::new(&job, &scene, &bounds(&job, &scene));
     let start = thread_time();
     let batches: Vec<_> = (0..runs).map(|i| realization.batch(i)).collect();
@@ -262,9 +262,4 @@ fn vertices(job: &Job, scene: &Scene) -> f64 {
         trace(scene, &job.transport, &mut stream.generator(history), &mut vertices);
     }
     vertices.len() as f64 / SAMPLE as f64
-}
-
-/// CPU time of this thread.
-fn thread_time() -> Duration {
-    clock_gettime(ClockId::CLOCK_THREAD_CPUTIME_ID).expect("Linux has this clock").into()
 }

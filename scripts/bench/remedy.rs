@@ -4,13 +4,12 @@
 //! FOM = 1 / (mean squared relative error of the bins x CPU seconds of the one thread). Both kernels are run in turn, every
 //! figure is the median of three seeds. It is from this table that the default sizes of batches were chosen.
 
+mod common;
+
+use common::{load, prepare, thread_time};
 use lampyris::farm::pilot::bounds;
 use lampyris::farm::realization::Realization;
-use lampyris::job::Job;
-use lampyris::scene::{Model, Scene, gltf};
 use lampyris::tally::statistics::{Estimate, figure_of_merit, median};
-use nix::time::{ClockId, clock_gettime};
-use std::time::Duration;
 
 /// Histories of a run, over all batches.
 const HISTORIES: u64 = 8192;
@@ -104,8 +103,7 @@ fn run(task: &Task, size: u64, seed: u64, bounded: bool) -> Reached {
          bounded = {bounded}\n{}",
         task.scene, task.receivers
     );
-    let job = Job::parse(&text, "bench").expect("the job is right");
-    let scene = Scene::new(load(task.scene), &job).expect("the scene is right");
+    let (job, scene) = prepare(&text, load(task.scene));
     let realization = Realization::new(&job, &scene, &bounds(&job, &scene));
     let start = thread_time();
     let scores: Vec<_> = (0..batches).map(|i| realization.batch(i)).collect();
@@ -124,15 +122,4 @@ fn run(task: &Task, size: u64, seed: u64, bounded: bool) -> Reached {
         relative_error: mean_square.sqrt(),
         worst: errors.iter().fold(0.0, |a, &b| f64::max(a, b)),
     }
-}
-
-fn load(name: &str) -> Model {
-    let path = format!("{}/scenes/{name}.glb", env!("CARGO_MANIFEST_DIR"));
-    let bytes = std::fs::read(path).expect("the scene is in the repository");
-    gltf::load(name, &bytes, &mut |uri: &str| panic!("{uri}: the scene is one file")).expect("the scene is right")
-}
-
-/// CPU time of this thread: whoever else uses the machine does not count.
-fn thread_time() -> Duration {
-    clock_gettime(ClockId::CLOCK_THREAD_CPUTIME_ID).expect("the kernel counts the time of threads").into()
 }

@@ -3,6 +3,8 @@
 //! The room of `jobs/room.toml` with fewer batches, by one worker process of as many threads as there are cores, and by
 //! two that share them; wall clock, medians of interleaved runs.
 
+use lampyris::job::Job;
+use lampyris::tally::statistics::median;
 use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
@@ -17,6 +19,7 @@ fn main() {
         .replace("../scenes/room.glb", &scene)
         .replace("\nbatches = 64", "\nbatches = 8\nsampling = \"random\"")
         .replace("\nbatches_per_shard = 16", "\nbatches_per_shard = 4");
+    let parsed = Job::parse(&job, "room.toml").expect("the job is right");
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("room.toml");
     std::fs::write(&path, job).expect("a job file");
@@ -35,14 +38,11 @@ fn main() {
             seconds[workers - 1].push(start.elapsed().as_secs_f64());
         }
     }
-    let [one, two] = seconds.map(median);
+    let [one, two] = seconds.map(|runs| median(runs.into_iter()));
+    let [batches, histories] = [parsed.run.batches, parsed.run.histories_per_batch];
+    let ratio = one / two;
     println!(
-        "room, 8 batches of 32 histories: 1 worker process on all cores {one:.2} s, 2 sharing them {two:.2} s, ratio {:.2}",
-        one / two
+        "room, {batches} batches of {histories} histories: 1 worker process on all cores {one:.2} s, 2 sharing them \
+         {two:.2} s, ratio {ratio:.2}"
     );
-}
-
-fn median(mut times: Vec<f64>) -> f64 {
-    times.sort_by(f64::total_cmp);
-    times[times.len() / 2]
 }

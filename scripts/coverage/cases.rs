@@ -13,14 +13,13 @@ use lampyris::scene::{Model, Reflectance, Surface, gltf};
 use lampyris::tally::statistics::Estimate;
 use lampyris::validate::closed_forms::ulbricht;
 use lampyris::validate::experiment::Experiment;
-use lampyris::validate::scenes::{closed_box, integrating_sphere, lambert, omni, point, sobolev, spot_camera};
+use lampyris::validate::scenes::{UP, closed_box, integrating_sphere, lambert, omni, point, sobolev, spot_camera};
 use rayon::prelude::*;
 use std::path::Path;
 
 /// Runs that make a truth, and the seed before the first of them.
 const LONG: u64 = 400;
 const OTHER_SEEDS: u64 = 1 << 40;
-const UP: [f64; 3] = [0.0, 1.0, 0.0];
 /// E on Sobolev's plane 1, case A, r = 1 (src/validate/reference/sobolev_tables.csv) \[lx\].
 const SOBOLEV_A_1: f64 = 0.653442317194389;
 
@@ -194,7 +193,7 @@ fn cornell(n: u64) -> Result<Vec<Counted>> {
            normal = [0, 1, 0]\ncolumns = 1\nrows = 2\n"
         + &point("block", [0.37, 0.17, -0.169], UP)
         + &point("near", [0.005, 0.1, -0.3], UP);
-    let experiment = Experiment::new(&job, room("scenes/cornell.glb")?)?;
+    let experiment = Experiment::new(&job, load("cornell")?)?;
     let wanted = [
         ("E on the short block", Kind::Total(1, 0)),
         ("E 5 mm from a wall", Kind::Total(2, 0)),
@@ -205,10 +204,11 @@ fn cornell(n: u64) -> Result<Vec<Counted>> {
     Ok(count("Cornell box, area light, rqmc", &experiment, quantities, n))
 }
 
-/// A scene file of this repository.
-pub fn room(path: &str) -> Result<Model> {
-    let bytes = std::fs::read(path).map_err(Error::io(Path::new(path)))?;
-    gltf::load(path, &bytes, &mut |uri| panic!("{uri}: the scenes here are single files"))
+/// The model in `scenes/{name}.glb`.
+pub fn load(name: &str) -> Result<Model> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}.glb"));
+    let bytes = std::fs::read(&path).map_err(Error::io(&path))?;
+    gltf::load(name, &bytes, &mut |uri| panic!("{uri}: the scenes here are single files"))
 }
 
 /// What lights a cube with a glossy floor.

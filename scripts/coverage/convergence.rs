@@ -4,7 +4,7 @@
 //! N = 2^10 to 2^16. Pixels beside the lux-meters: their positions, one draw a batch, are a part of the variance that
 //! falls with the batches alone.
 
-use super::cases::room;
+use super::cases::load;
 use super::count::{is_marked, square};
 use super::replicate::{Kind, Reading, Replicate};
 use lampyris::error::Result;
@@ -12,13 +12,12 @@ use lampyris::math::log2;
 use lampyris::tally::health::{Mark, health};
 use lampyris::tally::statistics::Estimate;
 use lampyris::validate::experiment::Experiment;
-use lampyris::validate::scenes::point;
+use lampyris::validate::scenes::{UP, points};
 use rayon::prelude::*;
 use std::ops::RangeInclusive;
 
 /// Exponents m of the numbers of histories N = 2^m, of which 32 = 2^5 are the batches.
 const SIZES: RangeInclusive<u32> = 10..=16;
-const UP: [f64; 3] = [0.0, 1.0, 0.0];
 /// Lux-meters: place, position \[m\], direction.
 const METERS: [(&str, [f64; 3], [f64; 3]); 10] = [
     ("lit face, floor", [3.895, 0.0, -2.6], UP),
@@ -55,14 +54,12 @@ impl Found {
         kinds.extend((0..PIXELS).map(|i| (format!("pixel {i} (exempt)"), Kind::Total(0, i))));
         for size in SIZES {
             let histories = 1u32 << (size - 5);
-            let mut job = format!(
+            let job = format!(
                 "[run]\nhistories_per_batch = {histories}\nbatches = 32\nsampling = \"{sampling}\"\n\
-                 [[camera]]\nname = \"view\"\nnode = \"camera\"\nwidth = 3\nheight = 3\n"
+                 [[camera]]\nname = \"view\"\nnode = \"camera\"\nwidth = 3\nheight = 3\n{}",
+                points("p", METERS.map(|(_, position, normal)| (position, normal)))
             );
-            for (i, (_, position, normal)) in METERS.iter().enumerate() {
-                job += &point(&format!("p{i}"), *position, *normal);
-            }
-            let experiment = Experiment::new(&job, room("scenes/room.glb")?)?;
+            let experiment = Experiment::new(&job, load("room")?)?;
             let read = |seed| -> Vec<Reading> {
                 let replicate = Replicate::new(&experiment, seed);
                 kinds.iter().map(|(_, kind)| replicate.read(kind)).collect()

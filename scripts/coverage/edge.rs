@@ -8,7 +8,7 @@ use super::replicate::Kind;
 use lampyris::error::Result;
 use lampyris::math::{DVec3, PI};
 use lampyris::validate::experiment::Experiment;
-use lampyris::validate::scenes::{closed_box, lambert, point};
+use lampyris::validate::scenes::{UP, closed_box, lambert, points};
 
 /// Distances from the wall \[m\].
 const DISTANCES: [f64; 7] = [0.3, 0.1, 0.03, 0.01, 0.003, 0.001, 0.0003];
@@ -19,10 +19,7 @@ const PIXEL: &str = "[[camera]]\nname = \"edge\"\neye = [0.05, 0.5, 0.5]\ntarget
 
 /// The cube with lux-meters at `distances`, as the job and the model ask, after the tables of `run`.
 pub fn cube(run: &str, distances: &[f64]) -> Result<Experiment> {
-    let mut job = format!("{run}{PIXEL}");
-    for (i, s) in distances.iter().enumerate() {
-        job += &point(&format!("p{i}"), [*s, 0.0, 0.5], [0.0, 1.0, 0.0]);
-    }
+    let job = format!("{run}{PIXEL}{}", points("p", distances.iter().map(|&s| ([s, 0.0, 0.5], UP))));
     Experiment::new(&job, closed_box(DVec3::ONE, &lambert(0.5, 1.0 / PI)))
 }
 

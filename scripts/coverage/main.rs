@@ -7,7 +7,7 @@
 //! ```
 //!
 //! SAMPLING is rqmc or random, KERNEL bounded or plain. Tables go to the terminal as Markdown; docs/coverage.md holds a
-//! record. To be started in the folder of the repository: scenes are read from `scenes/`.
+//! record.
 
 mod cases;
 mod convergence;

@@ -1,17 +1,15 @@
 //! One replicate: an experiment under a seed of its own, and what it says of a quantity.
 //!
 //! Intervals and marks are the crate's: `Estimate` and `student_quantile`, `tally::derived`, `tally::health`; runs with a
-//! goal end at the looks of their plan. Only the input of the marks ([`Signs`]) is put together here, as the report does.
+//! goal end at the looks of their plan.
 
 use lampyris::farm::merge::goal::Goal;
 use lampyris::farm::plan::{Input, Plan, SceneSummary};
 use lampyris::farm::realization::Realization;
 use lampyris::job::Job;
 use lampyris::tally::derived::{Bounded, Family, Series, family_quantile, ratio};
-use lampyris::tally::health::Signs;
-use lampyris::tally::health::checks::{Outcome, checks, snapshots};
-use lampyris::tally::health::tail::tail_slope;
-use lampyris::tally::statistics::{Estimate, student_quantile, variance_of_variance};
+use lampyris::tally::health::{Common, Counted, Examined, Signs};
+use lampyris::tally::statistics::{Estimate, student_quantile};
 use lampyris::tally::{Moments, Replicates, SetTally, Tally};
 use lampyris::validate::experiment::Experiment;
 
@@ -159,35 +157,17 @@ impl Replicate {
 
     /// What the marks of a bin follow from.
     fn signs(&self, set: usize, bin: usize) -> Signs {
-        let batches = self.tally.batches();
-        let (random, direct, [peak, caustic, vov]) = match &self.tally.sets[set] {
-            SetTally::Moments(Moments { n, bins }) => {
-                (bins.estimate(bin, *n), bins.direct[bin], [bins.peak[bin], bins.caustic[bin], f64::NAN])
-            }
-            SetTally::Replicates(r) => {
-                let vov = variance_of_variance(r.scores(bin));
-                (r.estimate(bin), r.direct_mean(bin), [r.peak[bin], r.caustic[bin], vov])
-            }
+        let counted = match &self.tally.sets[set] {
+            SetTally::Moments(Moments { n, bins }) => Counted::of_moments(bins, bin, *n),
+            SetTally::Replicates(scores) => Counted::of_replicates(scores, bin),
         };
+        let run = &self.job.run;
         let fixed = self.fixed[set].get(bin).copied().unwrap_or(0.0);
-        let histories = batches as f64 * self.job.run.histories_per_batch as f64;
-        let sum = (random.mean - direct) * histories;
         let monitor = self.tally.monitors[set].iter().find(|m| m.bin as usize == bin);
-        let slope = monitor.and_then(|m| tail_slope(&m.largest));
-        let snapshots = monitor.map_or(Vec::new(), |m| snapshots(m, fixed));
-        let outcomes = checks(&snapshots, slope, self.job.run.sampling);
-        Signs {
-            batches,
-            informed: !random.standard_error.is_nan(),
-            relative_error: if random.standard_error == 0.0 { 0.0 } else { random.shifted(fixed).relative_error() },
-            peak: if peak > 0.0 && sum > 0.0 { peak / sum } else { f64::NAN },
-            vov,
-            history_vov: snapshots.last().map_or(f64::NAN, |s| s.vov),
-            slope,
-            failed_checks: outcomes[..9].iter().filter(|&&o| o == Outcome::Failed).count(),
-            caustic: caustic / random.standard_error,
-            histories_in_lobe: histories * self.narrowest_lobe * self.narrowest_lobe,
-        }
+        let examined = monitor.map(|m| Examined::new(m, fixed, run.sampling));
+        let histories = self.tally.batches() as f64 * run.histories_per_batch as f64;
+        let common = Common { histories, narrowest_lobe: self.narrowest_lobe };
+        Signs::of(&common, &counted, fixed, examined.as_ref())
     }
 }
 

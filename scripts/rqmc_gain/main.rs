@@ -3,7 +3,7 @@
 //!     cargo run --release --example rqmc_gain                        Sobolev's cases A and B at r = 0, 1, 2, 3
 //!     cargo run --release --example rqmc_gain -- jobs/room.toml      each receiver set of a job
 //!
-//! Options: `--batches N` (400) batches of each kind, `--histories N,N` (2048,8192) histories of a batch, powers of two.
+//! Options: `--batches N` (400) batches of each kind, a multiple of 20, `--histories N,N` (2048,8192) histories of a batch, powers of two.
 //! The variance of a receiver set is the sum over its bins. It is taken within 20 groups of batches; what follows "+-"
 //! is the standard error of the gain from the scatter of the groups.
 
@@ -55,7 +55,8 @@ fn options() -> Options {
             _ => options.jobs.push(word),
         }
     }
-    assert!(options.batches >= 2 * GROUPS, "--batches: at least {}", 2 * GROUPS);
+    let whole = options.batches.is_multiple_of(GROUPS) && options.batches >= 2 * GROUPS;
+    assert!(whole, "--batches: a multiple of {GROUPS}, at least {}, not {}", 2 * GROUPS, options.batches);
     assert!(options.histories.iter().all(|n| n.is_power_of_two()), "--histories: powers of two");
     options
 }

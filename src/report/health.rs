@@ -6,58 +6,14 @@ use super::number::short;
 use super::summary::SetSummary;
 use super::values::{Bin, SetValues};
 use crate::farm::plan::Plan;
-use crate::job::{Estimator, Sampling};
-use crate::tally::Monitor;
-use crate::tally::health::checks::{CHECKS, Outcome, Snapshot, checks, snapshots};
-use crate::tally::health::tail::tail_slope;
-use crate::tally::health::{Health, Mark};
+use crate::job::Estimator;
+use crate::tally::health::checks::{CHECKS, Outcome, Snapshot};
+use crate::tally::health::{Examined, Health, Mark};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// Monitored receivers beyond this number are left to `summary.json`.
 const MOST_LINES: usize = 12;
-
-/// What the single histories of one monitored bin say.
-pub(super) struct Examined {
-    /// Number of the bin in its set.
-    pub bin: u32,
-    /// Slope of the tail; None when too few histories are known.
-    pub slope: Option<f64>,
-    /// Largest total of a single history \[lx or cd/m2\]; NaN when none is known.
-    pub largest: f64,
-    /// In the order of [`CHECKS`].
-    pub checks: [Outcome; CHECKS.len()],
-    /// Through the second half of the run.
-    pub snapshots: Vec<Snapshot>,
-}
-
-impl Examined {
-    /// From `monitor`, with `fixed` the direct light that is the same in every batch.
-    pub fn new(monitor: &Monitor, fixed: f64, sampling: Sampling) -> Self {
-        let slope = tail_slope(&monitor.largest);
-        let snapshots = snapshots(monitor, fixed);
-        let checks = checks(&snapshots, slope, sampling);
-        let largest = monitor.largest.first().copied().unwrap_or(f64::NAN);
-        Examined { bin: monitor.bin, slope, largest, checks, snapshots }
-    }
-
-    /// How many of the first nine checks failed; the tenth has a mark of its own.
-    pub fn failed_checks(&self) -> usize {
-        self.checks[..CHECKS.len() - 1].iter().filter(|&&c| c == Outcome::Failed).count()
-    }
-
-    /// Variance of the variance of all single histories; NaN where it is not known.
-    pub fn vov(&self) -> f64 {
-        self.snapshots.last().map_or(f64::NAN, |s| s.vov)
-    }
-
-    /// All numbers in a fixed order, for a digest.
-    pub fn numbers(&self) -> Vec<f64> {
-        let of = |s: &Snapshot| [s.mean, s.relative_error, s.vov, s.figure_of_merit_per_history];
-        let ends = [self.slope.unwrap_or(f64::NAN), self.largest];
-        ends.into_iter().chain(self.snapshots.iter().flat_map(of)).collect()
-    }
-}
 
 /// A monitored receiver in `summary.json`.
 #[derive(Debug, Serialize)]

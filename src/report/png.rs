@@ -40,7 +40,7 @@ pub(super) fn write(plan: &Plan, merged: &Merged, values: &SetValues, to: &mut i
     };
     let zoom = Zoom::new(values, cell_shape(plan, values));
     let value = Panel::new(format!("{quantity} [{unit}]"), unit, values, colorous::INFERNO, |b| b.value);
-    let error = |b: &Bin| 100.0 * b.relative_error();
+    let error = |b: &Bin| 100.0 * b.relative_error;
     let error = Panel::new("relative standard error [%]".to_owned(), "%", values, colorous::VIRIDIS, error);
     let title = format!("{}: {} {}", plan.name, kind_name(values.shape.kind), values.shape.name);
     let picture = Picture {
@@ -80,7 +80,7 @@ fn remarks(merged: &Merged, values: &SetValues, zoom: &Zoom) -> Vec<String> {
     if zoom.step > 1 {
         remarks.push(format!("one of {} bins drawn in each direction", zoom.step));
     }
-    if values.bins.iter().any(|b| b.relative_error().is_nan()) {
+    if values.bins.iter().any(|b| b.relative_error.is_nan()) {
         remarks.push("grey: no receiver or no information".to_owned());
     }
     if merged.batches < FEW_BATCHES {

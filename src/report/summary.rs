@@ -4,7 +4,7 @@
 use super::derived::{OfRatio, OfSet, health_of_mean, of_set, ratios};
 use super::health::{Monitored, count_marks, count_unhealthy, estimate_label, is_plain, lines};
 use super::stopping::StoppedBy;
-use super::values::{Bin, SetValues, Status, kind_name, unit};
+use super::values::{SetValues, Status, kind_name, unit};
 use crate::farm::merge::Merged;
 use crate::farm::plan::{Input, Plan};
 use crate::tally::FLUX_BINS;
@@ -194,7 +194,7 @@ impl SetSummary {
         let bins = &values.bins;
         let count = |status| bins.iter().filter(|b| b.status == status).count();
         let found = || bins.iter().map(|b| b.value).filter(|x| x.is_finite());
-        let errors = || bins.iter().filter(|b| b.status == Status::Estimated).map(Bin::relative_error);
+        let errors = || bins.iter().filter(|b| b.status == Status::Estimated).map(|b| b.relative_error);
         let errors = || errors().filter(|x| x.is_finite());
         SetSummary {
             name: values.shape.name.clone(),

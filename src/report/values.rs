@@ -4,13 +4,12 @@
 //! number of batches is applied, and every bin gets its [`Status`]. Goals are judged by the same estimates
 //! ([`Estimate::with_fixed`]).
 
-use super::health::Examined;
 use crate::farm::merge::{Merged, SetResult};
 use crate::farm::plan::Plan;
 use crate::job::{ReceiverKind, SetShape};
-use crate::tally::health::{Health, Signs, health};
-use crate::tally::statistics::{Estimate, student_quantile, variance_of_variance};
-use crate::tally::{MomentBlock, Monitor, Replicates};
+use crate::tally::Monitor;
+use crate::tally::health::{Common, Counted, Examined, Health, Signs, health};
+use crate::tally::statistics::student_quantile;
 
 /// What is known of a bin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,6 +31,8 @@ pub(super) struct Bin {
     pub value: f64,
     /// Of that mean.
     pub standard_error: f64,
+    /// Standard error over the size of the value \[1\]; NaN where nothing is known.
+    pub relative_error: f64,
     /// Lower end of the interval, not clamped at 0.
     pub low: f64,
     /// Upper end of the interval.
@@ -42,8 +43,6 @@ pub(super) struct Bin {
     pub peak: f64,
     /// Variance of the variance of the batch scores \[1\]; NaN where only moments are kept.
     pub vov: f64,
-    /// Light that no bound holds, of the batch that has most of it \[cd/m2 or lx\].
-    pub caustic: f64,
     /// Linear Rec.709 whose luminance is `value`.
     pub colour: [f64; 3],
     /// What is known.
@@ -58,25 +57,19 @@ impl Bin {
         Bin {
             value: nan,
             standard_error: nan,
+            relative_error: nan,
             low: nan,
             high: nan,
             direct: nan,
             peak: nan,
             vov: nan,
-            caustic: nan,
             colour: [nan; 3],
             status,
             health: None,
         }
     }
 
-    /// Standard error over the size of the value \[1\]; NaN where nothing is known.
-    pub fn relative_error(&self) -> f64 {
-        // An exact zero has no error, where 0/0 would have no value.
-        if self.standard_error == 0.0 { 0.0 } else { self.standard_error / self.value.abs() }
-    }
-
-    /// All numbers in a fixed order, for a digest; caustic light is part of the health alone.
+    /// All numbers in a fixed order, for a digest.
     pub fn numbers(&self) -> [f64; 11] {
         let [r, g, b] = self.colour;
         let health = self.health_code();
@@ -108,21 +101,21 @@ impl SetValues {
         let fixed = |bin: u32| fixed_direct.get(bin as usize).copied().unwrap_or(0.0);
         let examine = |m: &Monitor| Examined::new(m, fixed(m.bin), run.sampling);
         let monitored: Vec<Examined> = monitors.iter().map(examine).collect();
+        let histories = batches as f64 * run.histories_per_batch as f64;
         let rule = Rule {
-            batches,
             quantile: student_quantile(run.confidence, batches),
-            histories: batches as f64 * run.histories_per_batch as f64,
-            narrowest_lobe: plan.scene.narrowest_lobe,
+            common: Common { histories, narrowest_lobe: plan.scene.narrowest_lobe },
         };
         let bins = match set {
             SetResult::Moments { bins, .. } => {
                 assert_eq!(bins.len(), shape.bins(), "the result of another set");
-                let raw = (0..bins.len()).map(|i| Raw::from_moments(bins, i, batches));
+                let colour = |i| bins.colour.get(i).copied();
+                let raw = (0..bins.len()).map(|i| (Counted::of_moments(bins, i, batches), colour(i)));
                 rule.apply(raw, fixed_direct, &monitored)
             }
             SetResult::Replicates { scores, .. } => {
                 assert!(scores.has_shape(shape.bins(), batches), "the result of another set");
-                let raw = (0..shape.bins()).map(|i| Raw::from_replicates(scores, i));
+                let raw = (0..shape.bins()).map(|i| (Counted::of_replicates(scores, i), None));
                 rule.apply(raw, fixed_direct, &monitored)
             }
         };
@@ -160,117 +153,58 @@ pub(super) fn kind_name(kind: ReceiverKind) -> &'static str {
     }
 }
 
-/// What a tally says of the random part of a bin.
-struct Raw {
-    estimate: Estimate,
-    direct: f64,
-    peak: f64,
-    vov: f64,
-    caustic: f64,
-    colour: Option<[f64; 3]>,
-}
-
-impl Raw {
-    fn from_moments(bins: &MomentBlock, i: usize, batches: u64) -> Self {
-        Raw {
-            estimate: bins.estimate(i, batches),
-            direct: bins.direct[i],
-            peak: bins.peak[i],
-            vov: f64::NAN,
-            caustic: bins.caustic[i],
-            colour: bins.colour.get(i).copied(),
-        }
-    }
-
-    fn from_replicates(scores: &Replicates, i: usize) -> Self {
-        Raw {
-            estimate: scores.estimate(i),
-            direct: scores.direct_mean(i),
-            peak: scores.peak[i],
-            vov: variance_of_variance(scores.scores(i)),
-            caustic: scores.caustic[i],
-            colour: None,
-        }
-    }
-}
+/// What a tally says of a bin, and its colour where one is kept.
+type Raw = (Counted, Option<[f64; 3]>);
 
 /// What is the same for all bins of a set.
 struct Rule {
-    batches: u64,
     quantile: f64,
-    /// Histories of all batches.
-    histories: f64,
-    /// alpha of the narrowest lobe in the scene.
-    narrowest_lobe: f64,
+    common: Common,
 }
 
 impl Rule {
     fn apply(&self, raw: impl Iterator<Item = Raw>, fixed_direct: &[f64], monitored: &[Examined]) -> Vec<Bin> {
         let known = |(i, raw): (usize, Raw)| {
             let examined = monitored.binary_search_by_key(&i, |e| e.bin as usize).ok().map(|at| &monitored[at]);
-            let mut bin = self.bin(&raw, fixed_direct, i);
-            bin.health = (bin.status != Status::NoReceiver).then(|| self.health(&bin, examined));
-            bin
+            self.bin(raw, fixed_direct, i, examined)
         };
         let bins: Vec<Bin> = raw.enumerate().map(known).collect();
         assert!(fixed_direct.is_empty() || fixed_direct.len() == bins.len(), "direct light of another set");
         bins
     }
 
-    fn bin(&self, raw: &Raw, fixed_direct: &[f64], i: usize) -> Bin {
-        let Some(estimate) = raw.estimate.with_fixed(fixed_direct, i) else {
+    fn bin(&self, (counted, colour): Raw, fixed_direct: &[f64], i: usize, examined: Option<&Examined>) -> Bin {
+        let Some(estimate) = counted.estimate.with_fixed(fixed_direct, i) else {
             return Bin::unknown(Status::NoReceiver);
         };
-        if estimate.n == 0 {
-            return Bin::unknown(Status::NoInformation);
-        }
         let fixed = fixed_direct.get(i).copied().unwrap_or(0.0);
+        let signs = Signs::of(&self.common, &counted, fixed, examined);
+        let health = Some(health(&signs));
+        if estimate.n == 0 {
+            return Bin { health, ..Bin::unknown(Status::NoInformation) };
+        }
         let (low, high) = estimate.interval(self.quantile);
         Bin {
             value: estimate.mean,
             standard_error: estimate.standard_error,
+            relative_error: signs.relative_error,
             low,
             high,
-            direct: fixed + raw.direct,
-            peak: self.peak(raw),
-            vov: raw.vov,
-            caustic: raw.caustic,
+            direct: fixed + counted.direct,
+            peak: signs.peak,
+            vov: signs.vov,
             // Fixed light has no colour of its own in a tally: added as grey it keeps the luminance right.
-            colour: raw.colour.map_or([estimate.mean; 3], |c| c.map(|x| x + fixed)),
-            status: status(estimate),
-            health: None,
+            colour: colour.map_or([estimate.mean; 3], |c| c.map(|x| x + fixed)),
+            status: status(signs.informed, estimate.standard_error),
+            health,
         }
-    }
-
-    /// The marks of an existing bin.
-    fn health(&self, bin: &Bin, examined: Option<&Examined>) -> Health {
-        health(&Signs {
-            batches: self.batches,
-            informed: bin.status != Status::NoInformation,
-            relative_error: bin.relative_error(),
-            peak: bin.peak,
-            vov: bin.vov,
-            history_vov: examined.map_or(f64::NAN, Examined::vov),
-            slope: examined.and_then(|e| e.slope),
-            failed_checks: examined.map_or(0, Examined::failed_checks),
-            caustic: bin.caustic / bin.standard_error,
-            histories_in_lobe: self.histories * self.narrowest_lobe * self.narrowest_lobe,
-        })
-    }
-
-    /// Share of the largest history in the sum of all; NaN where no history contributed.
-    fn peak(&self, raw: &Raw) -> f64 {
-        let sum = (raw.estimate.mean - raw.direct) * self.histories;
-        // Without a contribution the difference above is rounding noise, so the largest history decides.
-        if raw.peak > 0.0 && sum > 0.0 { raw.peak / sum } else { f64::NAN }
     }
 }
 
-fn status(estimate: Estimate) -> Status {
-    match estimate {
-        Estimate { n: 1, .. } => Status::Estimated,
-        Estimate { standard_error, .. } if standard_error.is_nan() => Status::NoInformation,
-        Estimate { standard_error: 0.0, .. } => Status::Exact,
+fn status(informed: bool, standard_error: f64) -> Status {
+    match standard_error {
+        _ if !informed => Status::NoInformation,
+        0.0 => Status::Exact,
         _ => Status::Estimated,
     }
 }

@@ -5,37 +5,35 @@ use super::closed_forms::{cavity, ulbricht};
 use super::experiment::{Experiment, flux};
 use super::form_factors::{mean_of_meters, wall_meters};
 use super::scenes::{
-    PLAIN, add_polygon, add_quad, closed_box, integrating_sphere, lambert, omni, point, run, spot_camera,
+    PLAIN, UP, add_polygon, box_walls, closed_box, enclosure, integrating_sphere, lambert, omni, point, run,
+    spot_camera,
 };
-use super::{Case, Comparison};
+use super::{Case, Comparison, Theme};
 use crate::error::Result;
 use crate::math::{DVec3, PI, sin_cos};
 use crate::scene::Model;
 use crate::tally::statistics::Estimate;
 
-const THEME: &str = "Closed cavities";
-const UP: [f64; 3] = [0.0, 1.0, 0.0];
+const THEME: Theme = Theme("Closed cavities");
 
 /// The cases, in order.
 pub(super) fn cases() -> Vec<Case> {
-    let case = |name, checks, reference, run: fn() -> Result<Vec<Comparison>>| Case {
-        theme: THEME,
-        name,
-        checks,
-        reference,
-        run: Box::new(run),
-    };
     vec![
-        case(
+        THEME.case(
             "cavity/ulbricht-sphere",
             "even indirect light, illuminance and luminance",
             "E_0 + rho Phi / (4 pi R^2 (1 - rho)), L = rho E / pi",
             ulbricht_sphere,
         ),
-        case("cavity/furnace", "walls that emit 1 lm/m2: the same luminance everywhere", "1 / (1 - rho)", furnace),
-        case("cavity/furnace-orders", "each number of reflections by itself, plain estimate", "rho^n", orders),
-        case("cavity/mean-illuminance", "mean indirect light of the walls", "rho Phi / (S (1 - rho))", means),
-        case("cavity/flux-balance", "absorbed, escaped and lost light", "the flux of the sources", balances),
+        THEME.case(
+            "cavity/furnace",
+            "walls that emit 1 lm/m2: the same luminance everywhere",
+            "1 / (1 - rho)",
+            furnace,
+        ),
+        THEME.case("cavity/furnace-orders", "each number of reflections by itself, plain estimate", "rho^n", orders),
+        THEME.case("cavity/mean-illuminance", "mean indirect light of the walls", "rho Phi / (S (1 - rho))", means),
+        THEME.case("cavity/flux-balance", "absorbed, escaped and lost light", "the flux of the sources", balances),
     ]
 }
 
@@ -71,13 +69,18 @@ fn tetrahedron(rho: f64) -> Model {
     model
 }
 
+/// A box whose walls emit 1 lm/m2, one of them seen by a camera, and a lux-meter on its floor, after the tables of `run`.
+fn box_of_light(run: &str, rho: f64) -> Result<Experiment> {
+    let meter = point("e", [0.4, 0.0, 0.9], UP);
+    let camera = spot_camera("l", [0.5, 1.0, 1.5], [1.0, 1.1, 1.2], UP);
+    let walls = closed_box(DVec3::new(1.0, 2.0, 3.0), &lambert(rho, 1.0 / PI));
+    Experiment::new(&format!("{run}{meter}{camera}"), walls)
+}
+
 fn furnace() -> Result<Vec<Comparison>> {
     let mut all = Vec::new();
     for rho in [0.3, 0.5, 0.8] {
-        let job =
-            run(8192, 32) + &point("e", [0.4, 0.0, 0.9], UP) + &spot_camera("l", [0.5, 1.0, 1.5], [1.0, 1.1, 1.2], UP);
-        let walls = closed_box(DVec3::new(1.0, 2.0, 3.0), &lambert(rho, 1.0 / PI));
-        let found = Experiment::new(&job, walls)?.values();
+        let found = box_of_light(&run(8192, 32), rho)?.values();
         let exact = cavity(1.0, 1.0, rho);
         all.push(Comparison::new(format!("L in a box, rho = {rho}"), "cd/m2", found[0], exact / PI));
         all.push(Comparison::new(format!("E in a box, rho = {rho}"), "lx", found[1], exact));
@@ -90,12 +93,7 @@ fn furnace() -> Result<Vec<Comparison>> {
 
 fn orders() -> Result<Vec<Comparison>> {
     let rho = 0.5;
-    let job = run(8192, 64)
-        + PLAIN
-        + &point("e", [0.4, 0.0, 0.9], UP)
-        + &spot_camera("l", [0.5, 1.0, 1.5], [1.0, 1.1, 1.2], UP);
-    let box_of_light = closed_box(DVec3::new(1.0, 2.0, 3.0), &lambert(rho, 1.0 / PI));
-    let experiment = Experiment::new(&job, box_of_light)?;
+    let experiment = box_of_light(&(run(8192, 64) + PLAIN), rho)?;
     // No order at all leaves the sampled direct light: E_0 = M0, and L0 + K L0 = (1 + rho) M0 / pi.
     let direct = experiment.estimates_of_orders(0..0);
     let mut all = vec![
@@ -114,24 +112,24 @@ fn orders() -> Result<Vec<Comparison>> {
 /// Mean indirect illuminance with 100 cd inside; the direct part of the mean, Phi / S, is exact and not a matter of
 /// local estimation.
 fn mean_indirect(name: &str, walls: &[[DVec3; 3]], rho: f64) -> Result<Comparison> {
-    let mut model = Model::default();
-    walls.iter().for_each(|&[origin, u, v]| add_quad(&mut model, origin, u, v, lambert(rho, 0.0)));
     let (meters, weights) = wall_meters(walls);
     let job = run(128, 16) + &omni([0.4, 0.6, 0.5], 100.0) + &meters;
-    let (_, batches) = Experiment::new(&job, model)?.batches(1..u32::MAX);
+    let (_, batches) = Experiment::new(&job, enclosure(walls, &lambert(rho, 0.0)))?.batches(1..u32::MAX);
     let exact = rho * cavity(400.0 * PI, walls.len() as f64, rho);
     // 1e-4: what the Gauss rule loses near edges.
     Ok(Comparison::new(format!("{name}, rho = {rho}"), "lx", mean_of_meters(&batches, &weights), exact).within(1e-4))
 }
 
 fn means() -> Result<Vec<Comparison>> {
-    let (o, x, y, z) = (DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z);
-    let cube = [[o, z, x], [y, x, z], [o, x, y], [z, y, x], [o, y, z], [x, z, y]];
+    // Floor and ceiling first, as below: what a lux-meter draws depends on its name, a number in the order of the walls.
+    let mut cube = box_walls(DVec3::ONE);
+    cube.rotate_left(2);
     let mut all = Vec::new();
     for rho in [0.3, 0.5, 0.8] {
         all.push(mean_indirect("unit cube", &cube, rho)?);
     }
     // An L of three unit cubes: floor and ceiling of three squares each, eight walls, one edge that juts in.
+    let (o, x, y, z) = (DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z);
     let flat = |at: DVec3| [[at, z, x], [at + y, x, z]];
     let mut l: Vec<_> = [o, x, z].into_iter().flat_map(flat).collect();
     l.extend([[o, x, y], [x, x, y], [o, y, z], [z, y, z]]);

@@ -41,7 +41,7 @@ impl Comparison {
         Comparison { tolerance, ..self }
     }
 
-    /// Distance from the reference in standard errors; `None` for values computed without any history.
+    /// Distance from the reference in standard errors; `None` for values that are the same in every batch.
     pub fn z(&self) -> Option<f64> {
         let Estimate { mean, standard_error, .. } = self.estimate;
         (standard_error != 0.0).then(|| (mean - self.reference) / standard_error)

@@ -3,27 +3,25 @@
 use super::closed_forms::inverse_square;
 use super::experiment::Experiment;
 use super::reference::analytic;
-use super::scenes::{PLAIN, closed_box, lambert, omni, point, run};
-use super::{Case, Comparison};
+use super::scenes::{PLAIN, UP, closed_box, lambert, omni, points, run};
+use super::{Case, Comparison, Theme};
 use crate::error::Result;
 use crate::math::DVec3;
 
+const THEME: Theme = Theme("Cube lit from its middle");
 /// Accuracy of the indirect part of the table, and near corners.
 const TABLE: [f64; 2] = [2e-4, 1e-3];
 
 /// The cases, in order.
 pub(super) fn cases() -> Vec<Case> {
-    let case = |name, checks, run: fn() -> Result<Vec<Comparison>>| Case {
-        theme: "Cube lit from its middle",
-        name,
-        checks,
-        reference: "direct: I h / d^3; indirect: collocation, about 1e-4, table",
-        run: Box::new(run),
+    let case = |name, checks, rho, places, transport| {
+        let reference = "direct: I h / d^3; indirect: collocation, about 1e-4, table";
+        THEME.case(name, checks, reference, move || walls(rho, places, transport))
     };
     vec![
-        case("cube/rho-0.5", "points of a wall, to 1 cm from an edge and a corner", || walls(0.5, &PLACES, "")),
-        case("cube/rho-0.8", "the same in a brighter cube", || walls(0.8, &PLACES, "")),
-        case("cube/plain", "points far from edges, plain estimate", || walls(0.5, &PLACES[..4], PLAIN)),
+        case("cube/rho-0.5", "points of a wall, to 1 cm from an edge and a corner", 0.5, &PLACES[..], ""),
+        case("cube/rho-0.8", "the same in a brighter cube", 0.8, &PLACES[..], ""),
+        case("cube/plain", "points far from edges, plain estimate", 0.5, &PLACES[..4], PLAIN),
     ]
 }
 
@@ -31,10 +29,8 @@ pub(super) fn cases() -> Vec<Case> {
 const PLACES: [(f64, f64); 6] = [(0.5, 0.5), (0.25, 0.5), (0.25, 0.25), (0.1, 0.1), (0.01, 0.5), (0.01, 0.01)];
 
 fn walls(rho: f64, places: &[(f64, f64)], transport: &str) -> Result<Vec<Comparison>> {
-    let mut job = run(8192, 32) + transport + &omni([0.5; 3], 100.0);
-    for (i, (u, v)) in places.iter().enumerate() {
-        job += &point(&format!("p{i}"), [*u, 0.0, *v], [0.0, 1.0, 0.0]);
-    }
+    let meters = points("p", places.iter().map(|&(u, v)| ([u, 0.0, v], UP)));
+    let job = run(8192, 32) + transport + &omni([0.5; 3], 100.0) + &meters;
     let experiment = Experiment::new(&job, closed_box(DVec3::ONE, &lambert(rho, 0.0)))?;
     let indirect = experiment.estimates_of_orders(1..u32::MAX);
     let direct = experiment.direct();

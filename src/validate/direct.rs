@@ -4,52 +4,47 @@ use super::closed_forms::{
     flux_through_rectangle, inverse_square, parallel_corner, perpendicular_corner, polygon, spot_solid_angle,
 };
 use super::experiment::{Experiment, flux};
-use super::scenes::{add_polygon, add_quad, closed_box, integrating_sphere, lambert, omni, point, run};
-use super::{Case, Comparison};
+use super::scenes::{
+    UP, add_polygon, add_quad, closed_box, in_parallel_light, integrating_sphere, lambert, omni, point, points,
+    rectangle, run,
+};
+use super::{Case, Comparison, Theme};
 use crate::error::Result;
 use crate::math::{DVec3, PI, acos, cos, sin_cos};
 use crate::photometry::Colour;
 use crate::scene::{Light, Model};
 use crate::tally::statistics::Estimate;
 
-const THEME: &str = "Sources and direct light";
-const UP: [f64; 3] = [0.0, 1.0, 0.0];
+const THEME: Theme = Theme("Sources and direct light");
 /// Sizes of the rectangles: width, depth or height, distance \[m\].
 const RECTANGLES: [(f64, f64, f64); 4] = [(1.0, 1.0, 1.0), (2.0, 1.0, 1.0), (3.0, 2.0, 0.5), (0.3, 0.3, 2.0)];
 
 /// The cases, in order.
 pub(super) fn cases() -> Vec<Case> {
-    let case = |name, checks, reference, run: fn() -> Result<Vec<Comparison>>| Case {
-        theme: THEME,
-        name,
-        checks,
-        reference,
-        run: Box::new(run),
-    };
     vec![
-        case("direct/point-source", "inverse square and cosine law", "I h / d^3 and I x / d^3", point_source),
-        case("direct/spot", "falloff and flux of a spot", "falloff of KHR_lights_punctual; its integral", spot),
-        case("direct/parallel-light", "cosine law, nothing behind", "E cos(60 deg)", parallel_light),
-        case(
+        THEME.case("direct/point-source", "inverse square and cosine law", "I h / d^3 and I x / d^3", point_source),
+        THEME.case("direct/spot", "falloff and flux of a spot", "falloff of KHR_lights_punctual; its integral", spot),
+        THEME.case("direct/parallel-light", "cosine law, nothing behind", "E cos(60 deg)", parallel_light),
+        THEME.case(
             "direct/flux-through-rectangle",
             "flux of a point source through a rectangle, from a grid and from histories",
             "4 I atan(ab / (h sqrt(a^2 + b^2 + h^2)))",
             rectangle_flux,
         ),
-        case(
+        THEME.case(
             "direct/parallel-rectangle",
             "area light above corner, middle and a point outside",
             "configuration factor of a parallel rectangle, signed sums of it",
             parallel_rectangle,
         ),
-        case(
+        THEME.case(
             "direct/perpendicular-rectangle",
             "area light on a wall, a window above its sill",
             "configuration factor of a perpendicular rectangle",
             perpendicular_rectangle,
         ),
-        case("direct/polygon", "area light with 32 sides", "Lambert's sum over the edges", thirty_two_sides),
-        case("direct/even-sky", "the same luminance from everywhere above", "pi L and pi L / 2", even_sky),
+        THEME.case("direct/polygon", "area light with 32 sides", "Lambert's sum over the edges", thirty_two_sides),
+        THEME.case("direct/even-sky", "the same luminance from everywhere above", "pi L and pi L / 2", even_sky),
     ]
 }
 
@@ -93,11 +88,11 @@ fn spot() -> Result<Vec<Comparison>> {
     // Half way in the cosine the ramp is a quarter.
     let middle = acos(0.5 * (cos(inner) + cos(outer)));
     let angles = [("full", 0.1, 25.0), ("on the ramp", middle, 25.0 / 4.0), ("outside", 0.9, 0.0)];
-    let mut job = run(1, 16);
-    for (i, (_, angle, _)) in angles.iter().enumerate() {
-        let (s, c) = sin_cos(*angle);
-        job += &point(&format!("p{i}"), [2.0 * s, -2.0 * c, 0.0], [-s, c, 0.0]);
-    }
+    let towards_spot = |(_, angle, _)| {
+        let (s, c) = sin_cos(angle);
+        ([2.0 * s, -2.0 * c, 0.0], [-s, c, 0.0])
+    };
+    let job = run(1, 16) + &points("p", angles.map(towards_spot));
     let values = Experiment::new(&job, spot_model(floor_far_below(), inner, outer))?.values();
     let mut all: Vec<Comparison> =
         values.iter().zip(angles).map(|(e, (name, _, exact))| Comparison::new(name, "lx", *e, exact)).collect();
@@ -115,9 +110,7 @@ fn spot() -> Result<Vec<Comparison>> {
 }
 
 fn parallel_light() -> Result<Vec<Comparison>> {
-    let mut model = floor_far_below();
-    let direction = DVec3::new(0.75f64.sqrt(), -0.5, 0.0);
-    model.lights.push(Light::Directional { direction, illuminance: Colour::grey(1000.0) });
+    let model = in_parallel_light(floor_far_below(), DVec3::new(0.75f64.sqrt(), -0.5, 0.0), 1000.0);
     let job = run(1, 16) + &point("before", [0.0; 3], UP) + &point("behind", [0.0; 3], [0.0, -1.0, 0.0]);
     let values = Experiment::new(&job, model)?.values();
     Ok(vec![
@@ -147,21 +140,17 @@ fn rectangle_flux() -> Result<Vec<Comparison>> {
 }
 
 /// Illuminances at points under an emissive polygon.
-fn luminaire(luminance: f64, corners: &[DVec3], points: &str) -> Result<Vec<Estimate>> {
+fn luminaire(luminance: f64, corners: &[DVec3], meters: &str) -> Result<Vec<Estimate>> {
     let mut model = Model::default();
     add_polygon(&mut model, corners, lambert(0.0, luminance));
-    Ok(Experiment::new(&(run(8192, 32) + points), model)?.values())
-}
-
-fn rectangle(origin: DVec3, u: DVec3, v: DVec3) -> [DVec3; 4] {
-    [origin, origin + u, origin + u + v, origin + v]
+    Ok(Experiment::new(&(run(8192, 32) + meters), model)?.values())
 }
 
 fn parallel_rectangle() -> Result<Vec<Comparison>> {
-    let points = point("centre", [1.0, 0.0, 0.5], UP)
+    let meters = point("centre", [1.0, 0.0, 0.5], UP)
         + &point("corner", [0.0, 0.0, 0.0], UP)
         + &point("outside", [-1.0, 0.0, 0.0], UP);
-    let e = luminaire(1000.0, &rectangle(DVec3::Y * 2.0, DVec3::X * 2.0, DVec3::Z), &points)?;
+    let e = luminaire(1000.0, &rectangle(DVec3::Y * 2.0, DVec3::X * 2.0, DVec3::Z), &meters)?;
     let corner = |a, b| 1000.0 * PI * parallel_corner(a, b, 2.0);
     let mut all = vec![
         Comparison::new("2 x 1 m, below its middle", "lx", e[0], 4.0 * corner(1.0, 0.5)),
@@ -198,8 +187,7 @@ fn thirty_two_sides() -> Result<Vec<Comparison>> {
     let corners: Vec<DVec3> = (0..32).map(corner).collect();
     let at = |x: f64| [x, 0.0, 0.0];
     let distances = [0.0, 1.0, 3.0];
-    let points: String = distances.iter().enumerate().map(|(i, &x)| point(&format!("p{i}"), at(x), UP)).collect();
-    let e = luminaire(1000.0, &corners, &points)?;
+    let e = luminaire(1000.0, &corners, &points("p", distances.map(|x| (at(x), UP))))?;
     let exact = |x: f64| polygon(1000.0, DVec3::from(at(x)), DVec3::Y, &corners);
     let compare = |(&x, e): (&f64, &Estimate)| Comparison::new(format!("x = {x} m"), "lx", *e, exact(x));
     Ok(distances.iter().zip(&e).map(compare).collect())

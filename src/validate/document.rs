@@ -110,9 +110,11 @@ fn introduction(found: &[Found], note: Option<&str>) -> String {
          {summary}\
          Each case isolates one property and has an exact answer. A comparison holds when the estimate lies within\n\
          t standard errors of the reference, t being Student's quantile at which a right program fails anywhere in\n\
-         all comparisons together with probability 1e-6, and when its standard error is at most 0.5 %. Values\n\
-         marked *exact* are computed without any history and must agree within 2e-6 (f32 coordinates). Comparisons\n\
-         of one case share their histories, so their errors go together.\n"
+         all comparisons together with probability 1e-6, and when its standard error is at most 0.5 %. To t standard\n\
+         errors comes the accuracy of coordinates, 2e-6 of the reference (f32), or what the reference is known to: 1e-5\n\
+         for the sum over a grid, 1e-4 for means by a Gauss rule, 2e-4 and near corners 1e-3 for the cube's table.\n\
+         Values marked *exact* are the same in every batch: their standard error is 0, and that accuracy alone decides.\n\
+         Comparisons of one case share their histories, so their errors go together.\n"
     )
 }
 

@@ -5,27 +5,21 @@
 use super::closed_forms::{parallel_rectangles, perpendicular_squares};
 use super::experiment::{Experiment, flux};
 use super::scenes::{add_quad, lambert, point, run};
-use super::{Case, Comparison};
+use super::{Case, Comparison, Theme};
 use crate::error::Result;
 use crate::math::{DVec3, PI};
 use crate::scene::Model;
 use crate::tally::BatchScores;
 use crate::tally::statistics::Estimate;
 
-const THEME: &str = "Form factors";
+const THEME: Theme = Theme("Form factors");
 
 /// The cases, in order.
 pub(super) fn cases() -> Vec<Case> {
-    let case = |name, checks, run: fn() -> Result<Vec<Comparison>>| Case {
-        theme: THEME,
-        name,
-        checks,
-        reference: "double area integral in closed form, times the flux of the emitter",
-        run: Box::new(run),
-    };
+    let reference = "double area integral in closed form, times the flux of the emitter";
     vec![
-        case("form-factor/parallel", "rectangles that face each other", parallel),
-        case("form-factor/perpendicular", "unit squares with a common edge", perpendicular),
+        THEME.case("form-factor/parallel", "rectangles that face each other", reference, parallel),
+        THEME.case("form-factor/perpendicular", "unit squares with a common edge", reference, perpendicular),
     ]
 }
 

@@ -50,6 +50,21 @@ pub struct Found {
     pub comparisons: Vec<Comparison>,
 }
 
+/// A heading, under which cases stand.
+struct Theme(&'static str);
+
+impl Theme {
+    fn case(
+        &self,
+        name: &'static str,
+        checks: &'static str,
+        reference: &'static str,
+        run: impl Fn() -> Result<Vec<Comparison>> + 'static,
+    ) -> Case {
+        Case { theme: self.0, name, checks, reference, run: Box::new(run) }
+    }
+}
+
 impl Case {
     /// Runs all jobs of the case.
     ///

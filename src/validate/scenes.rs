@@ -2,7 +2,10 @@
 
 use crate::math::DVec3;
 use crate::photometry::Colour;
-use crate::scene::{Model, Reflectance, Surface};
+use crate::scene::{Light, Model, Reflectance, Surface};
+
+/// The direction upwards.
+pub const UP: [f64; 3] = [0.0, 1.0, 0.0];
 
 /// A one-sided Lambert surface of `reflectance` \[1\] and emitted luminance `emission` \[cd/m2\].
 pub fn lambert(reflectance: f64, emission: f64) -> Surface {
@@ -16,7 +19,12 @@ pub fn lambert(reflectance: f64, emission: f64) -> Surface {
 
 /// Adds a parallelogram with corner `origin` \[m\]; its front is the side of u x v.
 pub fn add_quad(model: &mut Model, origin: DVec3, u: DVec3, v: DVec3, surface: Surface) {
-    add_polygon(model, &[origin, origin + u, origin + u + v, origin + v], surface);
+    add_polygon(model, &rectangle(origin, u, v), surface);
+}
+
+/// The corners of a parallelogram, counter-clockwise seen from the side of u x v \[m\].
+pub fn rectangle(origin: DVec3, u: DVec3, v: DVec3) -> [DVec3; 4] {
+    [origin, origin + u, origin + u + v, origin + v]
 }
 
 /// Adds a convex polygon with `corners` \[m\], counter-clockwise seen from its front.
@@ -33,19 +41,33 @@ pub fn add_polygon(model: &mut Model, corners: &[DVec3], surface: Surface) {
 
 /// A closed box from the origin to `size` \[m\] whose insides are the fronts, every wall like `surface`.
 pub fn closed_box(size: DVec3, surface: &Surface) -> Model {
-    let (x, y, z) = (DVec3::X * size.x, DVec3::Y * size.y, DVec3::Z * size.z);
+    enclosure(&box_walls(size), surface)
+}
+
+/// The `walls`, each an origin, u and v \[m\], all like `surface`.
+pub fn enclosure(walls: &[[DVec3; 3]], surface: &Surface) -> Model {
     let mut model = Model::default();
-    let walls = [(DVec3::ZERO, y, z), (x, z, y), (DVec3::ZERO, z, x), (y, x, z), (DVec3::ZERO, x, y), (z, y, x)];
-    for (origin, u, v) in walls {
-        add_quad(&mut model, origin, u, v, surface.clone());
-    }
+    walls.iter().for_each(|&[origin, u, v]| add_quad(&mut model, origin, u, v, surface.clone()));
+    model
+}
+
+/// The walls of a box from the origin to `size` as origin, u and v, u x v inwards \[m\]: those at x = 0 and at its other
+/// end, floor, ceiling, those at z = 0 and at its other end.
+pub fn box_walls(size: DVec3) -> [[DVec3; 3]; 6] {
+    let (o, x, y, z) = (DVec3::ZERO, DVec3::X * size.x, DVec3::Y * size.y, DVec3::Z * size.z);
+    [[o, y, z], [x, z, y], [o, z, x], [y, x, z], [o, x, y], [z, y, x]]
+}
+
+/// `model` in parallel light along `direction` of `illuminance` across it \[lx\].
+pub fn in_parallel_light(mut model: Model, direction: DVec3, illuminance: f64) -> Model {
+    model.lights.push(Light::Directional { direction, illuminance: Colour::grey(illuminance) });
     model
 }
 
 /// The two planes of Sobolev's problem with their omni of 1 cd, after the tables of `run`; the caller adds receivers.
 pub fn sobolev(run: &str, h1: f64, rho1: f64, rho2: f64) -> String {
     let source = omni([0.0, h1, 0.0], 1.0);
-    let (lower, upper) = (plane([0.0; 3], [0.0, 1.0, 0.0], rho1), plane([0.0, 1.0, 0.0], [0.0, -1.0, 0.0], rho2));
+    let (lower, upper) = (plane([0.0; 3], UP, rho1), plane([0.0, 1.0, 0.0], [0.0, -1.0, 0.0], rho2));
     format!("{run}\n{lower}{upper}{source}")
 }
 
@@ -75,6 +97,11 @@ pub fn omni(position: [f64; 3], intensity: f64) -> String {
 /// A lux-meter.
 pub fn point(name: &str, p: [f64; 3], n: [f64; 3]) -> String {
     format!("[[point]]\nname = \"{name}\"\nposition = {p:?}\nnormal = {n:?}\n")
+}
+
+/// Lux-meters at places and with normals, named by `prefix` and their numbers.
+pub fn points(prefix: &str, places: impl IntoIterator<Item = ([f64; 3], [f64; 3])>) -> String {
+    places.into_iter().enumerate().map(|(i, (p, n))| point(&format!("{prefix}{i}"), p, n)).collect()
 }
 
 /// A camera of one pixel, so narrow that it sees a point.

@@ -3,13 +3,13 @@
 
 use super::experiment::{Experiment, estimates, flux};
 use super::reference::{SOBOLEV, SOBOLEV_ORDERS, number, rows};
-use super::scenes::{PLAIN, point, run, sobolev, spot_camera};
-use super::{Case, Comparison};
+use super::scenes::{PLAIN, UP, point, points, run, sobolev, spot_camera};
+use super::{Case, Comparison, Theme};
 use crate::error::Result;
 use crate::math::PI;
 use crate::scene::Model;
 
-const THEME: &str = "Sobolev's problem";
+const THEME: Theme = Theme("Sobolev's problem");
 
 /// Height of the lamp \[m\] and reflectances of a published case.
 pub struct Parameters {
@@ -33,19 +33,13 @@ pub const CASES: [Parameters; 4] = [
 
 /// The cases, in order.
 pub(super) fn cases() -> Vec<Case> {
-    let total = |name, checks, which: usize, histories| Case {
-        theme: THEME,
-        name,
-        checks,
-        reference: "paper (7) by quadrature of 15 digits, table; L = rho E / pi",
-        run: Box::new(move || totals(&CASES[which], histories)),
+    let total = |name, checks, which: usize, histories| {
+        let reference = "paper (7) by quadrature of 15 digits, table; L = rho E / pi";
+        THEME.case(name, checks, reference, move || totals(&CASES[which], histories))
     };
-    let order = |name, checks, which: usize| Case {
-        theme: THEME,
-        name,
-        checks,
-        reference: "Hankel transform of paper (7) order by order, table",
-        run: Box::new(move || orders(&CASES[which])),
+    let order = |name, checks, which: usize| {
+        let reference = "Hankel transform of paper (7) order by order, table";
+        THEME.case(name, checks, reference, move || orders(&CASES[which]))
     };
     vec![
         total("sobolev/A", "h 0.5 and 0.5, rho 0.5 and 0.5: E and L of both planes", 0, 4096),
@@ -65,7 +59,7 @@ fn totals(case: &Parameters, histories: u32) -> Result<Vec<Comparison>> {
     let mut job = sobolev(&run(histories, 64), h1, rho1, rho2);
     for (i, row) in rows.iter().enumerate() {
         let r = number(row, "r");
-        job += &point(&format!("e1_{i}"), [r, 0.0, 0.0], [0.0, 1.0, 0.0]);
+        job += &point(&format!("e1_{i}"), [r, 0.0, 0.0], UP);
         job += &point(&format!("e2_{i}"), [0.0, 1.0, -r], [0.0, -1.0, 0.0]);
         if seen(r) {
             job += &spot_camera(&format!("l1_{i}"), [r, 0.9, 0.0], [r, 0.0, 0.0], [1.0, 0.0, 0.0]);
@@ -100,10 +94,8 @@ fn totals(case: &Parameters, histories: u32) -> Result<Vec<Comparison>> {
 const RADII: [f64; 4] = [0.0, 0.5, 1.0, 2.0];
 
 fn orders(case: &Parameters) -> Result<Vec<Comparison>> {
-    let mut job = sobolev(&(run(16384, 64) + PLAIN), case.h1, case.rho1, case.rho2);
-    for (i, r) in RADII.iter().enumerate() {
-        job += &point(&format!("e{i}"), [*r, 0.0, 0.0], [0.0, 1.0, 0.0]);
-    }
+    let planes = sobolev(&(run(16384, 64) + PLAIN), case.h1, case.rho1, case.rho2);
+    let job = planes + &points("e", RADII.map(|r| ([r, 0.0, 0.0], UP)));
     let experiment = Experiment::new(&job, Model::default())?;
     let table = rows(SOBOLEV_ORDERS);
     let of_plane_1 = table.iter().filter(|row| row["case"] == case.name && row["plane"] == "1");

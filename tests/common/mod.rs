@@ -54,6 +54,12 @@ pub fn compare(name: impl ToString, estimate: Estimate, reference: f64) -> Compa
     Comparison::new(name, "", estimate, reference)
 }
 
+/// The estimate `a` against the reference `b` of the same quantity, which has an error of its own.
+pub fn difference(name: impl ToString, a: Estimate, b: Estimate) -> Comparison {
+    let standard_error = (a.standard_error * a.standard_error + b.standard_error * b.standard_error).sqrt();
+    compare(name, Estimate { standard_error, ..a }, b.mean)
+}
+
 /// What is wrong with `c`, one of `comparisons`.
 pub fn verdict(c: &Comparison, comparisons: usize) -> Option<String> {
     c.failure(comparisons)

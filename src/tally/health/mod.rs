@@ -31,7 +31,10 @@
 //! How often the marks are right is measured in docs/coverage.md.
 
 pub mod checks;
+mod signs;
 pub mod tail;
+
+pub use signs::{Common, Counted, Examined, Signs};
 
 /// Below this number of batches an interval is marked: Student's quantile is then more than 9 % wider than a normal
 /// one, and batch means of skewed scores cover less than they promise.
@@ -141,31 +144,6 @@ impl Health {
     pub fn marks(self) -> impl Iterator<Item = Mark> {
         Mark::ALL.into_iter().filter(move |&mark| self.has(mark))
     }
-}
-
-/// What the health of a bin follows from. A number that is not known is NaN, and sets no mark.
-#[derive(Clone, Copy, Debug)]
-pub struct Signs {
-    /// Number of batches.
-    pub batches: u64,
-    /// False when nothing is known about the error.
-    pub informed: bool,
-    /// Standard error over mean \[1\]; 0 for a bin that is the same in every batch.
-    pub relative_error: f64,
-    /// Share of the largest history \[1\].
-    pub peak: f64,
-    /// Variance of the variance of the batch scores \[1\].
-    pub vov: f64,
-    /// Variance of the variance of single histories, of a monitored bin \[1\].
-    pub history_vov: f64,
-    /// Slope of the tail, of a monitored bin.
-    pub slope: Option<f64>,
-    /// Number of the first nine checks that failed, of a monitored bin.
-    pub failed_checks: usize,
-    /// Light that no bound holds, of the batch that has most of it \[standard errors\].
-    pub caustic: f64,
-    /// N alpha^2 of N histories and the narrowest lobe of the scene; 0 where there is a mirror.
-    pub histories_in_lobe: f64,
 }
 
 /// The marks that `signs` set.

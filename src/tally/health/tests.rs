@@ -6,6 +6,7 @@ use super::*;
 use crate::job::Sampling;
 use crate::math::{log, pow};
 use crate::random::{Domain, Generator, Stream};
+use crate::tally::statistics::Estimate;
 use crate::tally::{HistoryMoments, Monitor, Watched};
 
 /// The monitor of `batches` batches of 64 independent histories each.
@@ -187,4 +188,21 @@ fn what_is_not_known_sets_no_mark() {
     assert!(health(&unknown).is_healthy());
     assert!(health(&Signs { vov: 0.5, batches: 49, ..HEALTHY }).is_healthy(), "VOV of few batches");
     assert!(health(&Signs { relative_error: 0.0, batches: 1, vov: nan, ..HEALTHY }).is_healthy(), "known exactly");
+}
+
+#[test]
+fn signs_are_shares_of_the_whole_value() {
+    let estimate = Estimate { n: 32, mean: 2.0, standard_error: 0.5 };
+    let counted = Counted { estimate, direct: 1.0, peak: 3.0, vov: 0.2, caustic: 1.0 };
+    let common = Common { histories: 300.0, narrowest_lobe: 0.5 };
+    let of = |counted: Counted| Signs::of(&common, &counted, 3.0, None);
+    let signs = of(counted);
+    // Fixed light is part of the value, and no light at the receiver is part of what histories brought.
+    assert_eq!((signs.relative_error, signs.peak, signs.caustic), (0.1, 0.01, 2.0));
+    assert_eq!((signs.batches, signs.informed, signs.histories_in_lobe), (32, true, 75.0));
+    let with = |n, mean, standard_error| of(Counted { estimate: Estimate { n, mean, standard_error }, ..counted });
+    assert_eq!(with(32, -3.0, 0.0).relative_error, 0.0, "an exact zero");
+    assert!(with(32, 1.0, 0.1).peak.is_nan(), "nothing but direct light");
+    assert!(with(1, 2.0, f64::NAN).informed && !with(32, 2.0, f64::NAN).informed);
+    assert!(!with(0, f64::NAN, f64::NAN).informed);
 }
