@@ -7,7 +7,7 @@ use crate::farm::merge::{Merged, SetResult};
 use crate::farm::plan::Plan;
 use crate::job::ReceiverKind;
 use crate::tally::derived::{Bounded, Family, Series, family_quantile, ratio};
-use crate::tally::health::{Health, Mark, Signs, health};
+use crate::tally::health::{Common, Counted, Health, Mark, Signs, health};
 use crate::tally::statistics::{Estimate, student_quantile, variance_of_variance};
 use serde::Serialize;
 
@@ -95,23 +95,21 @@ pub(super) fn health_of_mean(plan: &Plan, merged: &Merged, set: usize, values: &
     if let [bin] = &values.bins[..] {
         return bin.health.unwrap_or_default();
     }
-    let mean = Family::new(scores, fixed_direct).mean();
-    let estimate = mean.estimate();
-    let existing = || values.bins.iter().filter(|b| b.health.is_some());
-    let caustic = existing().map(|b| b.caustic).sum::<f64>() / existing().count() as f64;
-    let histories = (merged.batches * plan.job.run.histories_per_batch) as f64;
-    health(&Signs {
-        batches: merged.batches,
-        informed: !estimate.standard_error.is_nan(),
-        relative_error: if estimate.standard_error == 0.0 { 0.0 } else { estimate.relative_error() },
+    let family = Family::new(scores, fixed_direct);
+    let mean = family.mean();
+    let common = Common {
+        histories: (merged.batches * plan.job.run.histories_per_batch) as f64,
+        narrowest_lobe: plan.scene.narrowest_lobe,
+    };
+    let counted = Counted {
+        estimate: Estimate::from_scores(mean.scores.iter().copied()).or_no_error(mean.informed),
+        direct: f64::NAN,
+        // What a single history gives a mean over bins is not known.
         peak: f64::NAN,
         vov: variance_of_variance(mean.scores.iter().copied()),
-        history_vov: f64::NAN,
-        slope: None,
-        failed_checks: 0,
-        caustic: caustic / estimate.standard_error,
-        histories_in_lobe: histories * plan.scene.narrowest_lobe * plan.scene.narrowest_lobe,
-    })
+        caustic: family.caustic(),
+    };
+    health(&Signs::of(&common, &counted, mean.fixed, None))
 }
 
 /// The marks of the bin with the least value.

@@ -174,6 +174,12 @@ impl<'a> Family<'a> {
         Series { scores, fixed, informed: informed(existed, peak) }
     }
 
+    /// The mean over the bins of the largest light of a batch that no bound holds, see [`super::Scores::caustic`].
+    pub fn caustic(&self) -> f64 {
+        let sum: f64 = self.members.iter().map(|&(bin, _)| self.scores.caustic[bin]).sum();
+        sum / self.members.len() as f64
+    }
+
     /// The least of the means of the bins, by equation (11.6).
     pub fn minimum(&self, confidence: f64) -> Bounded {
         let estimate = |&(bin, fixed): &(usize, f64)| self.scores.estimate(bin).shifted(fixed);
