@@ -1,9 +1,10 @@
 //! Checkpoints -> one result: a left fold over shards in shard order.
 //!
 //! Of each shard the longest checkpoint counts, once the batch digests show the others to be its prefixes; so
-//! copies count once and the order of the folders changes nothing. Files are read one after the other, a block of
-//! bins at a time, so memory holds the result and one block. A file that cannot be trusted stops the merge and is
-//! named, with the reason; nothing here writes. Merging knows neither scene nor random numbers.
+//! copies count once and the order of the folders changes nothing; plans that ask for other results are refused.
+//! Files are read one after the other, a block of bins at a time, so memory holds the result and one block. A file
+//! that cannot be trusted stops the merge and is named, with the reason; nothing here writes. Merging knows neither
+//! scene nor random numbers.
 //!
 //! With a goal ([`goal`]) the fold ends at the first look of the plan at which it is reached. A look is judged once
 //! every shard before it is complete, and by these shards alone, so the result is a function of the checkpoint

@@ -322,7 +322,7 @@ fn folders_with_other_goals_are_refused_unless_one_goes_on_longer() {
     dirs.extend(others);
     for _ in 0..2 {
         let reason = refusal(&dirs);
-        assert!(reason.contains("plan.toml: refused: another goal than in a folder before it"), "{reason}");
+        assert!(reason.contains("plan.toml: refused: another [stop] than in a folder before it"), "{reason}");
         assert!(goal_reached(&dirs).is_err());
         dirs.reverse();
     }
@@ -331,5 +331,33 @@ fn folders_with_other_goals_are_refused_unless_one_goes_on_longer() {
         let (plan, result) = merge(&dirs).unwrap();
         assert_eq!((plan.job.run.batches, result.stopped, result.looks.len()), (44, None, 2));
         dirs.rotate_left(1);
+    }
+}
+
+#[test]
+fn folders_that_ask_for_other_intervals_or_ratios_are_refused() {
+    let ratio = "[[ratio]]\nname = \"r\"\nnumerator = \"desk\"\ndenominator = \"meter\"\n[[source]]";
+    let sure = ("seed = 7", "seed = 7\nconfidence = 0.99");
+    let cases: [(&[(&str, &str)], &str); 3] = [
+        (&[sure], "another run.confidence than in a folder before it: plan the job on both folders first"),
+        (&[("[[source]]", ratio)], "another [[ratio]] than"),
+        (&[sure, ("[[source]]", ratio)], "another run.confidence and [[ratio]] than"),
+    ];
+    for (changes, said) in cases {
+        let text = changes.iter().fold(JOB.to_owned(), |text, (from, to)| text.replacen(from, to, 1));
+        let (_a, mut both) = folders(&plan(), &[ALL]);
+        let (_b, other) = folders(&plan_of(&text).unwrap(), &[ALL]);
+        both.extend(other);
+        for _ in 0..2 {
+            let reason = refusal(&both);
+            assert!(reason.contains(said) && reason.contains(&both[1].plan_path().display().to_string()), "{reason}");
+            both.reverse();
+        }
+        // The same job on both: what was computed before counts, and the order is free.
+        both[0].establish(&plan_of(&text).unwrap(), &[]).unwrap();
+        both[1].establish(&plan_of(&text).unwrap(), &[]).unwrap();
+        let forth = merge(&both).unwrap();
+        both.reverse();
+        assert_eq!(merge(&both).unwrap(), forth);
     }
 }
