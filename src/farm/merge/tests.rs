@@ -1,5 +1,6 @@
 use super::goal::relative_half_width;
 use super::*;
+use crate::farm::checkpoint::{Content, read_header};
 use crate::farm::testing::{JOB, fixed_direct, plan, plan_of, save, save_tally, scores, tally};
 use crate::random::{Domain, Stream};
 use crate::tally::statistics::student_quantile;
@@ -266,6 +267,41 @@ fn the_decision_reads_the_sets_of_the_goal_and_the_batches_before_the_look() {
     spoil(1, |length| length / 2);
     assert_eq!(goal_reached(&folders).unwrap(), Some(16));
     assert!(refusal(&folders).contains("shard-000001.ckpt: refused: damaged: wrong checksum of Moments"));
+}
+
+/// Changes a byte of every section in the checkpoint of `shard` that holds something of the set number `of`.
+fn spoil_set(folder: &Folder, plan: &Plan, shard: u64, of: u32) {
+    let path = folder.shard_path(shard);
+    let sections = read_header(&path, plan, shard).unwrap().unwrap().sections;
+    let mut bytes = std::fs::read(&path).unwrap();
+    let start = bytes.len() as u64 - sections.iter().map(|s| s.bytes).sum::<u64>();
+    for section in sections {
+        match section.content {
+            Content::Moments { set, .. }
+            | Content::Replicates { set }
+            | Content::FixedDirect { set }
+            | Content::Monitors { set }
+                if set == of =>
+            {
+                bytes[(start + section.offset) as usize] ^= 1;
+            }
+            _ => {}
+        }
+    }
+    std::fs::write(path, bytes).unwrap();
+}
+
+#[test]
+fn the_decision_reads_nothing_of_other_sets() {
+    let plan = aiming(0.9, r#"["desk"]"#, 40);
+    let (_temp, folders) = folders(&plan, &[&whole(0..4)]);
+    for (number, set) in plan.sets().iter().enumerate().filter(|(_, set)| set.name != "desk") {
+        spoil_set(&folders[0], &plan, number as u64, number as u32);
+        assert_eq!(goal_reached(&folders).unwrap(), Some(16), "{}", set.name);
+        assert!(refusal(&folders).contains("damaged: wrong checksum"), "{}", set.name);
+    }
+    spoil_set(&folders[0], &plan, 2, 2);
+    assert!(goal_reached(&folders).unwrap_err().to_string().contains("wrong checksum of"), "the set of the goal");
 }
 
 #[test]
