@@ -90,6 +90,11 @@ fn bad_values_in_a_job_are_named_with_field_value_and_range() {
         ("sampling = \"random\"", "", "run.batches = 4: at least 16; any number with sampling = \"random\""),
         ("sampling = \"random\"", "sampling = \"sobol\"", "unknown variant `sobol`, expected `rqmc` or `random`"),
         (
+            "sampling = \"random\"",
+            "sampling = \"rqmc\"\n[transport]\nestimator = \"reverse\"",
+            "run.sampling = rqmc: \"random\" with estimator = \"reverse\", whose paths are independent",
+        ),
+        (
             "histories_per_batch = 1\nbatches = 4\nbatches_per_shard = 2\nsampling = \"random\"",
             "histories_per_batch = 2000\nbatches = 16",
             "run.histories_per_batch = 2000: a power of two: 1024 or 2048; any number with sampling = \"random\"",

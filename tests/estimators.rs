@@ -6,6 +6,7 @@ mod common;
 use common::scenes::{add_quad, closed_box, lambert, point, sobolev, spot_camera};
 use common::{Case, Comparison, Estimate, assert_all, compare, estimates, flux, number, table};
 use lampyris::farm::realization::Realization;
+use lampyris::job::{Job, Sampling};
 use lampyris::math::{DVec3, PI};
 use lampyris::photometry::Colour;
 use lampyris::scene::{Model, Reflectance, Surface};
@@ -328,6 +329,20 @@ fn direct_simulation_counts_only_what_comes_from_the_side_of_the_normal() {
     let (below, direct_below) = lit(DVec3::NEG_Y);
     assert_eq!(direct_above, 0.0);
     assert!(direct_below > 0.0 && below.mean > above.mean, "{above:?} {below:?}");
+}
+
+#[test]
+fn reverse_paths_are_independent_unless_somebody_types_otherwise() {
+    let job = |text: &str| Job::parse(&(text.to_owned() + &room_receivers() + &omni([1.0; 3], 1.0)), "test.toml");
+    let sampling = |text: &str| job(text).unwrap().run.sampling;
+    // Neither a power of two nor sixteen batches.
+    assert_eq!(sampling(&run("reverse", 1000, 3)), Sampling::Random);
+    assert_eq!(sampling("[transport]\nestimator = \"reverse\"\n"), Sampling::Random);
+    assert_eq!(sampling(&run("local", 1024, 16)), Sampling::Rqmc);
+    assert_eq!(sampling("[run]\nsampling = \"random\"\n"), Sampling::Random);
+    let typed = run("reverse", 1024, 16).replace("[run]", "[run]\nsampling = \"rqmc\"");
+    let refused = job(&typed).unwrap_err().to_string();
+    assert!(refused.contains("run.sampling = rqmc: \"random\" with estimator"), "{refused}");
 }
 
 #[test]

@@ -168,6 +168,9 @@ fn check_sampling(c: &Checker, job: &Job) -> Result<()> {
     if run.sampling == Sampling::Random {
         return Ok(());
     }
+    let reverse = job.transport.estimator == Estimator::Reverse;
+    let allowed = "\"random\" with estimator = \"reverse\", whose paths are independent";
+    c.that("run.sampling", "rqmc", !reverse, allowed)?;
     let n = run.histories_per_batch;
     let (below, above) = (1u64 << n.ilog2(), n.next_power_of_two());
     let allowed = format!("a power of two: {below} or {above}; any number with sampling = \"random\"");
