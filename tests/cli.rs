@@ -133,6 +133,7 @@ fn bad_values_in_a_job_are_named_with_field_value_and_range() {
         ("name = \"floor\"", "name = \"view\"", "name = view: a name used only once"),
         ("name = \"floor\"", "name = \"../floor\"", "name = ../floor: 1 .. 64 letters, digits"),
         ("name = \"floor\"", "name = \"summary\"", "name = summary: any name but points, regions, summary and flux"),
+        ("name = \"floor\"", "name = \"Points\"", "name = Points: any name but points, regions, summary and flux"),
         ("normal = [0.0, 1.0, 0.0]\ncolumns", "normal = [0, 0, 0]\ncolumns", "grid[0].normal = [0.0, 0.0, 0.0]: three"),
         ("columns = 2", "columns = 70000", "grid[0].columns = 70000: 1 .. 65536"),
         ("columns = 2\nrows = 2", "columns = 16000\nrows = 16000", "grid[0].keep_batches = true (\"floor\", with the"),

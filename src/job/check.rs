@@ -188,9 +188,11 @@ fn check_names(c: &Checker, job: &Job) -> Result<()> {
         let name = set.name.as_str();
         c.name("name", name)?;
         // Results are files named after their sets; `points.csv`, `regions.csv` and `summary.json` are already taken.
-        let free = !["points", "regions", "summary", "flux"].contains(&name);
+        // Capitals do not distinguish files everywhere.
+        let plain = name.to_ascii_lowercase();
+        let free = !["points", "regions", "summary", "flux"].contains(&plain.as_str());
         c.that("name", name, free, "any name but points, regions, summary and flux")?;
-        c.that("name", name, seen.insert(name.to_ascii_lowercase()), "a name used only once")?;
+        c.that("name", name, seen.insert(plain), "a name used only once")?;
     }
     Ok(())
 }
