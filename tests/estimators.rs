@@ -10,7 +10,7 @@ use lampyris::job::{Job, Sampling};
 use lampyris::math::{DVec3, PI};
 use lampyris::photometry::Colour;
 use lampyris::scene::{Model, Reflectance, Surface};
-use lampyris::tally::{BatchScores, Scores};
+use lampyris::tally::{BatchScores, Scores, SetTally, Tally};
 
 /// The run of one estimator: the plain local estimate, or `reverse` or `direct_simulation`.
 fn run(estimator: &str, histories: u32, batches: u32) -> String {
@@ -329,6 +329,21 @@ fn direct_simulation_counts_only_what_comes_from_the_side_of_the_normal() {
     let (below, direct_below) = lit(DVec3::NEG_Y);
     assert_eq!(direct_above, 0.0);
     assert!(direct_below > 0.0 && below.mean > above.mean, "{above:?} {below:?}");
+}
+
+#[test]
+fn sampled_direct_light_has_an_error_where_nothing_reflects() {
+    let mut model = Model::default();
+    add_quad(&mut model, DVec3::new(-0.5, 1.0, -0.5), DVec3::X, DVec3::Z, lambert(0.0, 100.0));
+    let cell = [DVec3::new(-0.5, 0.0, 0.5), DVec3::X, DVec3::NEG_Z, DVec3::Y];
+    for estimator in ["local", "reverse", "direct_simulation"] {
+        let case = Case::new(&(run(estimator, 256, 16) + &grid("g", cell, 1, 1)), model.clone());
+        let mut tally = Tally::new(&case.job.sets());
+        case.batches(0..u32::MAX).1.iter().for_each(|batch| tally.accumulate(batch));
+        let SetTally::Replicates(scores) = &tally.sets[0] else { panic!("a grid keeps its batches") };
+        let Estimate { mean, standard_error, .. } = scores.estimate(0);
+        assert!(mean > 0.0 && standard_error > 0.0, "{estimator}: {mean} +- {standard_error}");
+    }
 }
 
 #[test]
