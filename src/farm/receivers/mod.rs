@@ -4,6 +4,7 @@
 //! drawn anew each batch, carries the connections. A lux-meter stays where it is, and its direct light from lights
 //! without extent is computed once. How histories are turned into scores is in `local`.
 
+mod horizon;
 mod local;
 mod sight;
 
@@ -22,6 +23,7 @@ use crate::scene::Scene;
 use crate::transport::direct::{emitter_samples, from_emitters, from_lights};
 use crate::transport::eye::{Eye, Gaze, latitude};
 use crate::transport::receiver::{Receiver, Response, Seen, look, look_at};
+use horizon::Sight;
 
 /// One receiver set of a job, placed in a scene.
 pub struct ReceiverSet {
@@ -45,17 +47,6 @@ enum Bins {
     Meters(Vec<Option<Receiver>>),
 }
 
-/// Where a bin of directions lies that leave a surface point.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Sight {
-    Above,
-    /// Across the horizon: its mean is the mean over what lies above.
-    Across,
-    Below,
-}
-
-/// Positions along each side of a bin at which it is looked whether it lies above the horizon.
-const PROBES: u32 = 33;
 /// Draws after which a bin across the horizon is taken to show nothing of what lies above.
 const DRAWS: u32 = 1 << 16;
 
@@ -97,22 +88,10 @@ impl ReceiverSet {
         let continuations = Stream::new(job.run.seed, Domain::Continuation, &shape.name);
         let histories = job.run.histories_per_batch;
         let mut set = ReceiverSet { shape, bins, stream, continuations, histories, bound, sights: Vec::new() };
-        if let Bins::Film { eye: eye @ Eye::Surface { .. }, .. } = &set.bins {
-            set.sights = (0..set.shape.bins()).map(|i| set.probe(eye, i)).collect();
+        if let Bins::Film { eye: eye @ Eye::Surface { point }, .. } = &set.bins {
+            set.sights = (0..set.shape.bins()).map(|i| set.sight(eye, point.normal, i)).collect();
         }
         set
-    }
-
-    /// Looks where bin `i` of the directions that leave a surface point lies.
-    fn probe(&self, eye: &Eye, i: usize) -> Sight {
-        let side = |k: u32| f64::from(k) / f64::from(PROBES - 1);
-        let places = (0..PROBES).flat_map(|x| (0..PROBES).map(move |y| DVec2::new(side(x), side(y))));
-        let above = places.filter(|&p| !matches!(eye.gaze(self.film(i, 1, 0, p)), Gaze::Nowhere)).count() as u32;
-        match above {
-            0 => Sight::Below,
-            all if all == PROBES * PROBES => Sight::Above,
-            _ => Sight::Across,
-        }
     }
 
     /// Name, size and keeping.
@@ -287,3 +266,6 @@ fn meter(scene: &Scene, position: [f64; 3], normal: [f64; 3]) -> Option<Receiver
     let inside = scene.geometry.is_inside(lifted, |hit| scene.absorbs(hit));
     (!inside).then_some(Receiver { position, normal, response: Response::Cosine })
 }
+
+#[cfg(test)]
+mod tests;
