@@ -15,7 +15,7 @@ mod crossing;
 mod reverse;
 
 use crate::error::{Error, Result};
-use crate::job::{Camera, Job, SetShape};
+use crate::job::{Camera, Grid, Job, Point, SetShape};
 use crate::math::{DVec2, DVec3};
 use crate::photometry::Colour;
 use crate::random::{Domain, Generator, Stream};
@@ -112,7 +112,7 @@ impl ReceiverSet {
     }
 
     /// Refuses receivers of `job`, read from `file`, that cannot be placed in `scene`; says what the two say
-    /// differently.
+    /// differently, and which receivers have no finite value.
     ///
     /// # Errors
     /// [`Error::Input`] for a camera node that the scene has not, or a surface point without a surface.
@@ -142,6 +142,7 @@ impl ReceiverSet {
                 ));
             }
         }
+        warnings.extend(meters_on_lamps(job, scene));
         Ok(warnings)
     }
 
@@ -258,6 +259,27 @@ fn camera_eye(scene: &Scene, camera: &Camera) -> Eye {
         Some(name) => Eye::from_node(scene.camera(name).expect("the node was found when the job was planned"), aspect),
         None => Eye::from_view(scene, &camera.view().expect("a job is checked when it is read"), aspect),
     }
+}
+
+/// A warning for each point and each grid of `job` with a lux-meter on a lamp without extent; of a grid the first cell.
+fn meters_on_lamps(job: &Job, scene: &Scene) -> Vec<String> {
+    let of_point = |p: &Point| is_on_lamp(scene, p.position).then(|| format!("point {}", p.name));
+    let of_grid = |g: &Grid| {
+        let cells = 0..g.columns as usize * g.rows as usize;
+        let cell = cells.into_iter().find(|&i| is_on_lamp(scene, g.position(i)))?;
+        Some(format!("grid {}, cell [{}, {}]", g.name, cell % g.columns as usize, cell / g.columns as usize))
+    };
+    let meters = job.points.iter().filter_map(of_point).chain(job.grids.iter().filter_map(of_grid));
+    meters
+        .map(|meter| format!("{meter} lies on a lamp without extent, where illuminance has no finite value"))
+        .collect()
+}
+
+/// True nearer to a lamp than points are lifted off their surfaces: rounding alone may hide the coincidence.
+fn is_on_lamp(scene: &Scene, position: [f64; 3]) -> bool {
+    let position = scene.place(position);
+    let is_here = |lamp: DVec3| lamp.distance(position) <= scene.geometry.lift_length();
+    scene.sources.lights.iter().any(|light| light.at(position).0.is_some_and(is_here))
 }
 
 fn meter(scene: &Scene, position: [f64; 3], normal: [f64; 3]) -> Option<Receiver> {
