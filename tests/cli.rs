@@ -90,6 +90,11 @@ fn bad_values_in_a_job_are_named_with_field_value_and_range() {
         ("sampling = \"random\"", "", "run.batches = 4: at least 16; any number with sampling = \"random\""),
         ("sampling = \"random\"", "sampling = \"sobol\"", "unknown variant `sobol`, expected `rqmc` or `random`"),
         (
+            "sampling = \"random\"",
+            "sampling = \"rqmc\"\n[transport]\nestimator = \"reverse\"",
+            "run.sampling = rqmc: \"random\" with estimator = \"reverse\", whose paths are independent",
+        ),
+        (
             "histories_per_batch = 1\nbatches = 4\nbatches_per_shard = 2\nsampling = \"random\"",
             "histories_per_batch = 2000\nbatches = 16",
             "run.histories_per_batch = 2000: a power of two: 1024 or 2048; any number with sampling = \"random\"",
@@ -128,6 +133,7 @@ fn bad_values_in_a_job_are_named_with_field_value_and_range() {
         ("name = \"floor\"", "name = \"view\"", "name = view: a name used only once"),
         ("name = \"floor\"", "name = \"../floor\"", "name = ../floor: 1 .. 64 letters, digits"),
         ("name = \"floor\"", "name = \"summary\"", "name = summary: any name but points, regions, summary and flux"),
+        ("name = \"floor\"", "name = \"Points\"", "name = Points: any name but points, regions, summary and flux"),
         ("normal = [0.0, 1.0, 0.0]\ncolumns", "normal = [0, 0, 0]\ncolumns", "grid[0].normal = [0.0, 0.0, 0.0]: three"),
         ("columns = 2", "columns = 70000", "grid[0].columns = 70000: 1 .. 65536"),
         ("columns = 2\nrows = 2", "columns = 16000\nrows = 16000", "grid[0].keep_batches = true (\"floor\", with the"),

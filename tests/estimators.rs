@@ -9,10 +9,11 @@ use common::scenes::{
 };
 use common::{Case, Comparison, Estimate, assert_all, compare, difference, estimates, flux, number, table};
 use lampyris::farm::realization::Realization;
+use lampyris::job::{Job, Sampling};
 use lampyris::math::{DVec3, PI};
 use lampyris::photometry::Colour;
 use lampyris::scene::{Model, Reflectance, Surface};
-use lampyris::tally::{BatchScores, Scores};
+use lampyris::tally::{BatchScores, Scores, SetTally, Tally};
 
 /// The run of one estimator: `local`, whose kernel is bounded, `reverse` or `direct_simulation`.
 fn run(estimator: &str, histories: u32, batches: u32) -> String {
@@ -309,6 +310,35 @@ fn direct_simulation_counts_only_what_comes_from_the_side_of_the_normal() {
     let (below, direct_below) = lit(DVec3::NEG_Y);
     assert_eq!(direct_above, 0.0);
     assert!(direct_below > 0.0 && below.mean > above.mean, "{above:?} {below:?}");
+}
+
+#[test]
+fn sampled_direct_light_has_an_error_where_nothing_reflects() {
+    let mut model = Model::default();
+    add_quad(&mut model, DVec3::new(-0.5, 1.0, -0.5), DVec3::X, DVec3::Z, lambert(0.0, 100.0));
+    let cell = [DVec3::new(-0.5, 0.0, 0.5), DVec3::X, DVec3::NEG_Z, DVec3::Y];
+    for estimator in ["local", "reverse", "direct_simulation"] {
+        let case = Case::new(&(run(estimator, 256, 16) + &grid("g", cell, 1, 1)), model.clone());
+        let mut tally = Tally::new(&case.job.sets());
+        case.batches(0..u32::MAX).1.iter().for_each(|batch| tally.accumulate(batch));
+        let SetTally::Replicates(scores) = &tally.sets[0] else { panic!("a grid keeps its batches") };
+        let Estimate { mean, standard_error, .. } = scores.estimate(0);
+        assert!(mean > 0.0 && standard_error > 0.0, "{estimator}: {mean} +- {standard_error}");
+    }
+}
+
+#[test]
+fn reverse_paths_are_independent_unless_somebody_types_otherwise() {
+    let job = |text: &str| Job::parse(&(text.to_owned() + &room_receivers() + &omni([1.0; 3], 1.0)), "test.toml");
+    let sampling = |text: &str| job(text).unwrap().run.sampling;
+    // Neither a power of two nor sixteen batches.
+    assert_eq!(sampling(&run("reverse", 1000, 3)), Sampling::Random);
+    assert_eq!(sampling("[transport]\nestimator = \"reverse\"\n"), Sampling::Random);
+    assert_eq!(sampling(&run("local", 1024, 16)), Sampling::Rqmc);
+    assert_eq!(sampling("[run]\nsampling = \"random\"\n"), Sampling::Random);
+    let typed = run("reverse", 1024, 16).replace("[run]", "[run]\nsampling = \"rqmc\"");
+    let refused = job(&typed).unwrap_err().to_string();
+    assert!(refused.contains("run.sampling = rqmc: \"random\" with estimator"), "{refused}");
 }
 
 #[test]

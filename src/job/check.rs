@@ -168,6 +168,9 @@ fn check_sampling(c: &Checker, job: &Job) -> Result<()> {
     if run.sampling == Sampling::Random {
         return Ok(());
     }
+    let reverse = job.transport.estimator == Estimator::Reverse;
+    let allowed = "\"random\" with estimator = \"reverse\", whose paths are independent";
+    c.that("run.sampling", "rqmc", !reverse, allowed)?;
     let n = run.histories_per_batch;
     let (below, above) = (1u64 << n.ilog2(), n.next_power_of_two());
     let allowed = format!("a power of two: {below} or {above}; any number with sampling = \"random\"");
@@ -185,9 +188,11 @@ fn check_names(c: &Checker, job: &Job) -> Result<()> {
         let name = set.name.as_str();
         c.name("name", name)?;
         // Results are files named after their sets; `points.csv`, `regions.csv` and `summary.json` are already taken.
-        let free = !["points", "regions", "summary", "flux"].contains(&name);
+        // Capitals do not distinguish files everywhere.
+        let plain = name.to_ascii_lowercase();
+        let free = !["points", "regions", "summary", "flux"].contains(&plain.as_str());
         c.that("name", name, free, "any name but points, regions, summary and flux")?;
-        c.that("name", name, seen.insert(name.to_ascii_lowercase()), "a name used only once")?;
+        c.that("name", name, seen.insert(plain), "a name used only once")?;
     }
     Ok(())
 }

@@ -76,7 +76,8 @@ pub struct Run {
     pub batches: u64,
     /// Shard k holds the batches [k n, k n + n).
     pub batches_per_shard: u64,
-    /// How the histories of a batch are drawn.
+    /// How the histories of a batch are drawn. Left out: quasi-random, but random for the paths of reverse estimation,
+    /// which draw no point of a set.
     pub sampling: Sampling,
     /// Confidence of the intervals, between 0 and 1.
     pub confidence: f64,
@@ -278,6 +279,9 @@ impl Job {
         if typed.histories_per_batch.is_none() && job.has_maps() {
             job.run.histories_per_batch = HISTORIES_OF_MAPS;
         }
+        if typed.sampling.is_none() && job.transport.estimator == Estimator::Reverse {
+            job.run.sampling = Sampling::Random;
+        }
         check::check(&job, file)?;
         Ok(job)
     }
@@ -313,6 +317,7 @@ impl Job {
 struct Typed {
     batches: Option<u64>,
     histories_per_batch: Option<u64>,
+    sampling: Option<Sampling>,
 }
 
 impl Typed {

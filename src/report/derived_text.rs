@@ -1,7 +1,7 @@
 //! Derived quantities for a terminal: a line for each grid, region and ratio.
 
 use super::derived::{OfGrid, OfRatio, Quantity};
-use super::number::{label, short};
+use super::number::{percent, short};
 use super::summary::{SetSummary, Summary};
 
 /// Lines of one kind beyond this number are left to the files.
@@ -17,7 +17,7 @@ pub(super) fn lines(summary: &Summary) -> Vec<String> {
     if lines.is_empty() {
         return lines;
     }
-    let heading = format!("  derived, intervals at {} %:", label(100.0 * summary.confidence));
+    let heading = format!("  derived, intervals at {}:", percent(summary.confidence));
     std::iter::once(heading).chain(lines).collect()
 }
 

@@ -15,6 +15,16 @@ pub fn short(x: f64, digits: usize) -> String {
     format!("{x:.*}", decimals as usize)
 }
 
+/// The share `x`, which somebody typed, per cent: every digit of it, and none that the product with 100 would add.
+pub(super) fn percent(x: f64) -> String {
+    let scientific = format!("{x:e}");
+    let (digits, exponent) = scientific.split_once('e').unwrap_or((&scientific, "0"));
+    let exponent: i32 = exponent.parse().unwrap_or(0);
+    let hundredfold: f64 = format!("{digits}e{}", exponent + 2).parse().unwrap_or(f64::NAN);
+    let shortest = format!("{hundredfold:?}");
+    format!("{} %", shortest.trim_end_matches(".0"))
+}
+
 /// `x` with at most six significant digits and no trailing zeros: labels of a scale.
 pub(super) fn label(x: f64) -> String {
     let text = short(x, 6);
@@ -42,6 +52,22 @@ mod tests {
         ];
         for (x, text) in cases {
             assert_eq!(short(x, 4), text);
+        }
+    }
+
+    #[test]
+    fn percent_is_what_was_typed() {
+        let cases = [
+            (0.95, "95 %"),
+            (0.07, "7 %"),
+            (1.0, "100 %"),
+            (0.9999999, "99.99999 %"),
+            (0.9999999999999999, "99.99999999999999 %"),
+            (0.0123456789, "1.23456789 %"),
+            (1e-9, "1e-7 %"),
+        ];
+        for (x, text) in cases {
+            assert_eq!(percent(x), text);
         }
     }
 

@@ -1,6 +1,6 @@
 //! What ended a run with a goal, for `summary.json` and for eyes.
 
-use super::number::{label, short};
+use super::number::{percent, short};
 use crate::farm::merge::Merged;
 use crate::farm::merge::goal::Stopped;
 use crate::farm::plan::Plan;
@@ -95,9 +95,4 @@ impl StoppedBy {
         let bins = if self.share < 1.0 { format!(" in {} of the bins", percent(self.share)) } else { String::new() };
         format!("the {} interval of {sets} is within {}{bins}", percent(confidence), percent(self.relative_half_width))
     }
-}
-
-/// `x`, which somebody typed, as per cent.
-fn percent(x: f64) -> String {
-    format!("{} %", label(100.0 * x))
 }

@@ -72,10 +72,7 @@ pub struct Family<'a> {
 /// Two-sided factor of standard errors for one of `members` intervals over `n` batches that are to hold all together
 /// with probability `confidence`. NaN below n = 2.
 pub fn family_quantile(confidence: f64, members: usize, n: u64) -> f64 {
-    match members {
-        0 | 1 => student_quantile(confidence, n),
-        _ => tail_quantile(0.5 * (1.0 - confidence) / members as f64, n),
-    }
+    tail_quantile(0.5 * (1.0 - confidence) / members.max(1) as f64, n)
 }
 
 /// The statistic of `n` batches with its error by equation (11.5); `statistic` is given the batch to leave out.

@@ -1,7 +1,6 @@
 //! From batch scores to estimates, intervals and figures of merit (docs/method.md, "Statistics").
 
-use super::student::{MANY, tail_quantile};
-use statrs::distribution::{ContinuousCDF, StudentsT};
+use super::student::tail_quantile;
 
 /// The number with its error: mean of batch scores and standard error of that mean.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,19 +67,8 @@ impl Estimate {
 
 /// Two-sided Student quantile t for `n` batches: |T| <= t with probability `confidence`, n - 1 degrees of freedom.
 /// NaN below n = 2.
-///
-/// Rounded to ten significant digits: `statrs` takes its logarithms from the C library, whose last bits differ
-/// between machines, and intervals must not.
 pub fn student_quantile(confidence: f64, n: u64) -> f64 {
-    if n < 2 {
-        return f64::NAN;
-    }
-    if (n - 1) as f64 >= MANY {
-        return tail_quantile(0.5 * (1.0 - confidence), n);
-    }
-    let student = StudentsT::new(0.0, 1.0, (n - 1) as f64).expect("scale and freedom are positive");
-    let quantile = student.inverse_cdf(0.5 + 0.5 * confidence);
-    format!("{quantile:.9e}").parse().expect("a printed number reads back")
+    tail_quantile(0.5 * (1.0 - confidence), n)
 }
 
 /// Variance of the variance of batch scores, M4/M2^2 - 1/n, equation (11.2); NaN where M2 = 0.

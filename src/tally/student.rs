@@ -1,4 +1,4 @@
-//! Student's quantile far out in a tail: what intervals need that are to hold for many bins at once.
+//! Student's quantile, also far out in a tail: what intervals need that are to hold for many bins at once.
 //!
 //! The inverse in `statrs` is made for tails of everyday size: it is told 1 - tail, which forgets small tails, stops at
 //! an absolute accuracy, and does not return for very many degrees of freedom. Here the tail probability itself, which
@@ -12,7 +12,7 @@
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
 /// Degrees of freedom from which on the expansion is exact to eleven digits, for tails down to 1e-28.
-pub(super) const MANY: f64 = 1e4;
+const MANY: f64 = 1e4;
 
 /// The quantile of Student's t with n - 1 degrees of freedom that is exceeded with probability `tail`, above 0 and at
 /// most 1/2; infinite for `tail` = 0, NaN below n = 2. Rounded to ten significant digits: the last bits of the C
@@ -75,13 +75,21 @@ mod tests {
     }
 
     #[test]
-    fn everyday_tails_agree_with_the_quantile_of_an_interval() {
+    fn everyday_tails_agree_with_the_inverse_of_statrs() {
         for n in [2, 5, 16, 32, 256, 5000] {
-            for confidence in [0.5, 0.95, 0.99] {
-                let usual = crate::tally::statistics::student_quantile(confidence, n);
-                assert!(close(tail_quantile(0.5 * (1.0 - confidence), n), usual), "{n} {confidence}");
+            let student = StudentsT::new(0.0, 1.0, (n - 1) as f64).unwrap();
+            for tail in [0.25, 0.025, 0.005] {
+                let (quantile, theirs) = (tail_quantile(tail, n), student.inverse_cdf(1.0 - tail));
+                assert!(close(quantile, theirs), "{n} {tail}: {quantile} {theirs}");
             }
         }
+    }
+
+    #[test]
+    fn the_largest_confidence_below_one_has_a_finite_quantile() {
+        // 1 - confidence = 2^-53: with two degrees of freedom t = sqrt(2^53), all but 1 in 2^53.
+        let (confidence, t) = (0.9999999999999999, f64::from(1 << 26) * 2f64.sqrt());
+        assert!(close(crate::tally::statistics::student_quantile(confidence, 3), t));
     }
 
     #[test]

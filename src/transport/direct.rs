@@ -39,14 +39,12 @@ fn light_by_light(scene: &Scene, receiver: &Receiver, response: impl Fn(DVec3) -
     for light in &scene.sources.lights {
         let (from, w_in, across) = light.at(receiver.position);
         let cosine = -receiver.normal.dot(w_in);
-        if cosine <= 0.0 || across.is_black() {
-            continue;
-        }
-        let visible = match from {
+        let visible = || match from {
             Some(position) => scene.geometry.visible(lifted.as_vec3(), position.as_vec3()),
             None => scene.geometry.closest_hit(&Ray { origin: lifted, direction: -w_in }).is_none(),
         };
-        if visible {
+        // At the lamp itself the cosine is NaN, which is not above zero: no light instead of no number.
+        if cosine > 0.0 && !across.is_black() && visible() {
             sum += across * cosine * response(w_in);
         }
     }

@@ -95,7 +95,7 @@ impl Eye {
 
 /// Direction of a map position: row 0 is +Y, the centre looks along -Z, +X lies to its right. Rows are equal steps
 /// of latitude; `film.y` inside a row must be drawn uniform in its cosine, see [`latitude`].
-fn map_direction(film: DVec2) -> DVec3 {
+pub fn map_direction(film: DVec2) -> DVec3 {
     let (sin_polar, cos_polar) = sin_cos(PI * film.y);
     let (sin, cos) = sin_cos(2.0 * PI * (film.x - 0.5));
     DVec3::new(sin_polar * sin, cos_polar, -sin_polar * cos)

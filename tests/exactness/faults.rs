@@ -11,7 +11,7 @@ use std::path::Path;
 
 /// Works on `shard` until the fault kills the worker at `step` of its first replacement.
 #[track_caller]
-fn die_at(dir: &Path, shard: u64, step: Step) {
+pub fn die_at(dir: &Path, shard: u64, step: Step) {
     let fault = format!("{}:1", step.name());
     let output = work(dir, shard).env("LAMPYRIS_FAULT", &fault).output().unwrap();
     assert_eq!(output.status.signal(), Some(Signal::SIGKILL as i32), "{fault}: {}", output.status);

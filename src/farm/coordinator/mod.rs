@@ -78,9 +78,14 @@ pub fn run(folder: &Folder, plan: &Plan, options: Options, goal_reached: GoalRea
     let mut crew = Crew { folder, plan, slots, waiting, running: Vec::new(), shards, failures };
     let ended = crew.work(&stop, &mut watch, &mut progress);
     // Whatever happened, nobody is left behind and every checkpoint is written.
-    crew.dismiss()?;
+    let dismissed = crew.dismiss();
     progress.finish(&crew.shards);
-    ended
+    first_failure(ended, dismissed)
+}
+
+/// How the run ended; what went wrong at work comes before what went wrong at the end of it.
+fn first_failure(ended: Result<Ended>, dismissed: Result<()>) -> Result<Ended> {
+    ended.and_then(|ended| dismissed.map(|()| ended))
 }
 
 /// The progress of every shard, from headers.
@@ -183,13 +188,15 @@ impl Crew<'_> {
         Ok(())
     }
 
-    /// Asks every worker to write its checkpoint and stop, and waits until all have.
+    /// Asks every worker to write its checkpoint and stop, and waits until all have; then says what failed first.
     fn dismiss(&mut self) -> Result<()> {
         self.running.iter().for_each(Worker::ask_to_stop);
-        for worker in &mut self.running {
-            worker.wait()?;
-        }
+        let waited: Vec<Result<()>> = self.running.iter_mut().map(Worker::wait).collect();
         // A checkpoint refused here has been or will be refused by name; the last look is for the progress only.
-        self.refresh().or(Ok(()))
+        let _ = self.refresh();
+        waited.into_iter().collect()
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -73,6 +73,13 @@ impl Worker {
         Ok(Worker { shard, batches_at_start, child, stderr })
     }
 
+    /// `child` as the worker of `shard`.
+    #[cfg(test)]
+    pub fn fake(shard: u64, child: Child) -> Worker {
+        let stderr = tempfile::tempfile().expect("tests have room for a file");
+        Worker { shard, batches_at_start: 0, child, stderr }
+    }
+
     /// How it ended; None while it runs.
     pub fn ended(&mut self) -> Result<Option<Exit>> {
         let status = self.child.try_wait().map_err(|e| Error::Failed(format!("shard {}: {e}", self.shard)))?;

@@ -7,7 +7,6 @@ use crate::error::{Error, Result};
 use crate::farm::checkpoint::{Header, read_header};
 use crate::farm::folder::Folder;
 use crate::farm::plan::Plan;
-use crate::job::Stop;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -24,18 +23,26 @@ pub(super) fn common_plan(folders: &[Folder]) -> Result<Plan> {
             let reason = format!("another plan than that of the first folder:\n  {}", differences.join("\n  "));
             return Err(Error::refused(&folder.plan_path(), reason));
         }
-        // Which of two goals counted would depend on the order of the folders, and the result on that.
-        if plan.job.run.batches == longest.job.run.batches && goal(plan) != goal(longest) {
-            let reason = "another goal than in a folder before it: plan the job on both folders first";
+        // Which of two wishes counted would depend on the order of the folders, and the result on that.
+        let other = other_wishes(plan, longest);
+        if plan.job.run.batches == longest.job.run.batches && !other.is_empty() {
+            let other = other.join(" and ");
+            let reason = format!("another {other} than in a folder before it: plan the job on both folders first");
             return Err(Error::refused(&folder.plan_path(), reason));
         }
     }
     Ok(longest.clone())
 }
 
-/// All that decides when a run is at its goal.
-fn goal(plan: &Plan) -> Option<(&Stop, f64)> {
-    plan.job.stop.as_ref().map(|stop| (stop, plan.job.run.confidence))
+/// The fields, apart from the number of batches, in which two plans of the same shards ask for other results.
+fn other_wishes(a: &Plan, b: &Plan) -> Vec<&'static str> {
+    let (a, b) = (&a.job, &b.job);
+    let fields = [
+        ("[stop]", a.stop != b.stop),
+        ("run.confidence", a.run.confidence != b.run.confidence),
+        ("[[ratio]]", a.ratios != b.ratios),
+    ];
+    fields.into_iter().filter_map(|(field, differs)| differs.then_some(field)).collect()
 }
 
 /// A checkpoint whose header was read.

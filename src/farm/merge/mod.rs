@@ -1,9 +1,10 @@
 //! Checkpoints -> one result: a left fold over shards in shard order.
 //!
 //! Of each shard the longest checkpoint counts, once the batch digests show the others to be its prefixes; so
-//! copies count once and the order of the folders changes nothing. Files are read one after the other, a block of
-//! bins at a time, so memory holds the result and one block. A file that cannot be trusted stops the merge and is
-//! named, with the reason; nothing here writes. Merging knows neither scene nor random numbers.
+//! copies count once and the order of the folders changes nothing; plans that ask for other results are refused.
+//! Files are read one after the other, a block of bins at a time, so memory holds the result and one block. A file
+//! that cannot be trusted stops the merge and is named, with the reason; nothing here writes. Merging knows neither
+//! scene nor random numbers.
 //!
 //! With a goal ([`goal`]) the fold ends at the first look of the plan at which it is reached. A look is judged once
 //! every shard before it is complete, and by these shards alone, so the result is a function of the checkpoint
@@ -84,7 +85,8 @@ pub fn merge(folders: &[Folder]) -> Result<(Plan, Merged)> {
 }
 
 /// The number of batches after which the goal of the plan in `folders` has been reached; None when it has not yet.
-/// Reads no batch beyond the last look that can be judged, and no set that the goal does not ask for.
+/// Reads no batch beyond the last look that can be judged, and beside headers and flux nothing of the sets that the goal
+/// does not ask for.
 ///
 /// # Errors
 /// As [`merge`].
@@ -122,7 +124,7 @@ struct Fold<'a> {
     sets: Vec<SetFold>,
     monitors: Vec<Vec<Monitor>>,
     flux: Replicates,
-    /// Direct light of every set with the file and the checksums it was taken from.
+    /// Direct light of the sets that are folded, with the file and the checksums it was taken from.
     fixed: Option<(PathBuf, Vec<Checksum>, Vec<Vec<f64>>)>,
     batches: u64,
     seconds: f64,
@@ -181,10 +183,8 @@ impl<'a> Fold<'a> {
                 }
                 SetFold::Replicates(scores) => scores.append(reader.replicates(set)?),
             }
-        }
-        for (set, monitors) in self.monitors.iter_mut().enumerate() {
             let next = reader.monitors(set)?;
-            monitors.iter_mut().zip(next).for_each(|(monitor, next)| monitor.append(next));
+            self.monitors[set].iter_mut().zip(next).for_each(|(monitor, next)| monitor.append(next));
         }
         self.flux.append(reader.flux()?);
         let start = self.plan.shard(shard).start;
@@ -199,13 +199,14 @@ impl<'a> Fold<'a> {
         let checksums = reader.fixed_direct_checksums();
         match &self.fixed {
             None => {
-                let fixed = (0..self.shapes.len()).map(|set| reader.fixed_direct(set)).collect::<Result<_>>()?;
+                let mut fixed = vec![Vec::new(); self.shapes.len()];
+                self.read.iter().try_for_each(|&set| reader.fixed_direct(set).map(|light| fixed[set] = light))?;
                 self.fixed = Some((path.to_owned(), checksums, fixed));
                 Ok(())
             }
             Some((_, known, _)) if *known == checksums => {
                 // The bytes, too, must be those of the checksum.
-                (0..self.shapes.len()).try_for_each(|set| reader.fixed_direct(set).map(|_| ()))
+                self.read.iter().try_for_each(|&set| reader.fixed_direct(set).map(|_| ()))
             }
             Some((first, ..)) => {
                 let reason = format!("its direct light is another than in {}", first.display());

@@ -1,5 +1,6 @@
 use super::goal::relative_half_width;
 use super::*;
+use crate::farm::checkpoint::{Content, read_header};
 use crate::farm::testing::{JOB, fixed_direct, plan, plan_of, save, save_tally, scores, tally};
 use crate::random::{Domain, Stream};
 use crate::tally::statistics::student_quantile;
@@ -268,6 +269,41 @@ fn the_decision_reads_the_sets_of_the_goal_and_the_batches_before_the_look() {
     assert!(refusal(&folders).contains("shard-000001.ckpt: refused: damaged: wrong checksum of Moments"));
 }
 
+/// Changes a byte of every section in the checkpoint of `shard` that holds something of the set number `of`.
+fn spoil_set(folder: &Folder, plan: &Plan, shard: u64, of: u32) {
+    let path = folder.shard_path(shard);
+    let sections = read_header(&path, plan, shard).unwrap().unwrap().sections;
+    let mut bytes = std::fs::read(&path).unwrap();
+    let start = bytes.len() as u64 - sections.iter().map(|s| s.bytes).sum::<u64>();
+    for section in sections {
+        match section.content {
+            Content::Moments { set, .. }
+            | Content::Replicates { set }
+            | Content::FixedDirect { set }
+            | Content::Monitors { set }
+                if set == of =>
+            {
+                bytes[(start + section.offset) as usize] ^= 1;
+            }
+            _ => {}
+        }
+    }
+    std::fs::write(path, bytes).unwrap();
+}
+
+#[test]
+fn the_decision_reads_nothing_of_other_sets() {
+    let plan = aiming(0.9, r#"["desk"]"#, 40);
+    let (_temp, folders) = folders(&plan, &[&whole(0..4)]);
+    for (number, set) in plan.sets().iter().enumerate().filter(|(_, set)| set.name != "desk") {
+        spoil_set(&folders[0], &plan, number as u64, number as u32);
+        assert_eq!(goal_reached(&folders).unwrap(), Some(16), "{}", set.name);
+        assert!(refusal(&folders).contains("damaged: wrong checksum"), "{}", set.name);
+    }
+    spoil_set(&folders[0], &plan, 2, 2);
+    assert!(goal_reached(&folders).unwrap_err().to_string().contains("wrong checksum of"), "the set of the goal");
+}
+
 #[test]
 fn the_limit_is_not_a_look() {
     let at = |n: u64| width_of_meter(&plan(), n);
@@ -322,7 +358,7 @@ fn folders_with_other_goals_are_refused_unless_one_goes_on_longer() {
     dirs.extend(others);
     for _ in 0..2 {
         let reason = refusal(&dirs);
-        assert!(reason.contains("plan.toml: refused: another goal than in a folder before it"), "{reason}");
+        assert!(reason.contains("plan.toml: refused: another [stop] than in a folder before it"), "{reason}");
         assert!(goal_reached(&dirs).is_err());
         dirs.reverse();
     }
@@ -331,5 +367,33 @@ fn folders_with_other_goals_are_refused_unless_one_goes_on_longer() {
         let (plan, result) = merge(&dirs).unwrap();
         assert_eq!((plan.job.run.batches, result.stopped, result.looks.len()), (44, None, 2));
         dirs.rotate_left(1);
+    }
+}
+
+#[test]
+fn folders_that_ask_for_other_intervals_or_ratios_are_refused() {
+    let ratio = "[[ratio]]\nname = \"r\"\nnumerator = \"desk\"\ndenominator = \"meter\"\n[[source]]";
+    let sure = ("seed = 7", "seed = 7\nconfidence = 0.99");
+    let cases: [(&[(&str, &str)], &str); 3] = [
+        (&[sure], "another run.confidence than in a folder before it: plan the job on both folders first"),
+        (&[("[[source]]", ratio)], "another [[ratio]] than"),
+        (&[sure, ("[[source]]", ratio)], "another run.confidence and [[ratio]] than"),
+    ];
+    for (changes, said) in cases {
+        let text = changes.iter().fold(JOB.to_owned(), |text, (from, to)| text.replacen(from, to, 1));
+        let (_a, mut both) = folders(&plan(), &[ALL]);
+        let (_b, other) = folders(&plan_of(&text).unwrap(), &[ALL]);
+        both.extend(other);
+        for _ in 0..2 {
+            let reason = refusal(&both);
+            assert!(reason.contains(said) && reason.contains(&both[1].plan_path().display().to_string()), "{reason}");
+            both.reverse();
+        }
+        // The same job on both: what was computed before counts, and the order is free.
+        both[0].establish(&plan_of(&text).unwrap(), &[]).unwrap();
+        both[1].establish(&plan_of(&text).unwrap(), &[]).unwrap();
+        let forth = merge(&both).unwrap();
+        both.reverse();
+        assert_eq!(merge(&both).unwrap(), forth);
     }
 }

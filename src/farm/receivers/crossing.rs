@@ -52,7 +52,7 @@ impl ReceiverSet {
             let share = 1.0 / (cells.area() * self.histories as f64);
             scores.value[bin] = (direct + reflected).luminance() * share;
             scores.direct[bin] = direct.luminance() * share;
-            scores.existed[bin] = !self.counted_beforehand(bin).is_nan();
+            scores.existed[bin] = scene.reflects() && !self.counted_beforehand(bin).is_nan();
         }
         scores
     }

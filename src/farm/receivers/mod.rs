@@ -4,6 +4,7 @@
 //! drawn anew each batch, carries the connections. A lux-meter stays where it is, and its direct light from lights
 //! without extent is computed once. How histories are turned into scores is in `local`.
 
+mod horizon;
 mod local;
 mod sight;
 
@@ -14,7 +15,7 @@ mod crossing;
 mod reverse;
 
 use crate::error::{Error, Result};
-use crate::job::{Camera, Job, SetShape};
+use crate::job::{Camera, Grid, Job, Point, SetShape};
 use crate::math::{DVec2, DVec3};
 use crate::photometry::Colour;
 use crate::random::{Domain, Generator, Stream};
@@ -22,6 +23,7 @@ use crate::scene::Scene;
 use crate::transport::direct::{emitter_samples, from_emitters, from_lights};
 use crate::transport::eye::{Eye, Gaze, latitude};
 use crate::transport::receiver::{Receiver, Response, Seen, look, look_at};
+use horizon::Sight;
 
 /// One receiver set of a job, placed in a scene.
 pub struct ReceiverSet {
@@ -45,17 +47,6 @@ enum Bins {
     Meters(Vec<Option<Receiver>>),
 }
 
-/// Where a bin of directions lies that leave a surface point.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Sight {
-    Above,
-    /// Across the horizon: its mean is the mean over what lies above.
-    Across,
-    Below,
-}
-
-/// Positions along each side of a bin at which it is looked whether it lies above the horizon.
-const PROBES: u32 = 33;
 /// Draws after which a bin across the horizon is taken to show nothing of what lies above.
 const DRAWS: u32 = 1 << 16;
 
@@ -97,22 +88,10 @@ impl ReceiverSet {
         let continuations = Stream::new(job.run.seed, Domain::Continuation, &shape.name);
         let histories = job.run.histories_per_batch;
         let mut set = ReceiverSet { shape, bins, stream, continuations, histories, bound, sights: Vec::new() };
-        if let Bins::Film { eye: eye @ Eye::Surface { .. }, .. } = &set.bins {
-            set.sights = (0..set.shape.bins()).map(|i| set.probe(eye, i)).collect();
+        if let Bins::Film { eye: eye @ Eye::Surface { point }, .. } = &set.bins {
+            set.sights = (0..set.shape.bins()).map(|i| set.sight(eye, point.normal, i)).collect();
         }
         set
-    }
-
-    /// Looks where bin `i` of the directions that leave a surface point lies.
-    fn probe(&self, eye: &Eye, i: usize) -> Sight {
-        let side = |k: u32| f64::from(k) / f64::from(PROBES - 1);
-        let places = (0..PROBES).flat_map(|x| (0..PROBES).map(move |y| DVec2::new(side(x), side(y))));
-        let above = places.filter(|&p| !matches!(eye.gaze(self.film(i, 1, 0, p)), Gaze::Nowhere)).count() as u32;
-        match above {
-            0 => Sight::Below,
-            all if all == PROBES * PROBES => Sight::Above,
-            _ => Sight::Across,
-        }
     }
 
     /// Name, size and keeping.
@@ -133,7 +112,7 @@ impl ReceiverSet {
     }
 
     /// Refuses receivers of `job`, read from `file`, that cannot be placed in `scene`; says what the two say
-    /// differently.
+    /// differently, and which receivers have no finite value.
     ///
     /// # Errors
     /// [`Error::Input`] for a camera node that the scene has not, or a surface point without a surface.
@@ -163,6 +142,7 @@ impl ReceiverSet {
                 ));
             }
         }
+        warnings.extend(meters_on_lamps(job, scene));
         Ok(warnings)
     }
 
@@ -281,9 +261,33 @@ fn camera_eye(scene: &Scene, camera: &Camera) -> Eye {
     }
 }
 
+/// A warning for each point and each grid of `job` with a lux-meter on a lamp without extent; of a grid the first cell.
+fn meters_on_lamps(job: &Job, scene: &Scene) -> Vec<String> {
+    let of_point = |p: &Point| is_on_lamp(scene, p.position).then(|| format!("point {}", p.name));
+    let of_grid = |g: &Grid| {
+        let cells = 0..g.columns as usize * g.rows as usize;
+        let cell = cells.into_iter().find(|&i| is_on_lamp(scene, g.position(i)))?;
+        Some(format!("grid {}, cell [{}, {}]", g.name, cell % g.columns as usize, cell / g.columns as usize))
+    };
+    let meters = job.points.iter().filter_map(of_point).chain(job.grids.iter().filter_map(of_grid));
+    meters
+        .map(|meter| format!("{meter} lies on a lamp without extent, where illuminance has no finite value"))
+        .collect()
+}
+
+/// True nearer to a lamp than points are lifted off their surfaces: rounding alone may hide the coincidence.
+fn is_on_lamp(scene: &Scene, position: [f64; 3]) -> bool {
+    let position = scene.place(position);
+    let is_here = |lamp: DVec3| lamp.distance(position) <= scene.geometry.lift_length();
+    scene.sources.lights.iter().any(|light| light.at(position).0.is_some_and(is_here))
+}
+
 fn meter(scene: &Scene, position: [f64; 3], normal: [f64; 3]) -> Option<Receiver> {
     let (position, normal) = (scene.place(position), DVec3::from(normal).normalize());
     let lifted = scene.geometry.lift(position, normal);
     let inside = scene.geometry.is_inside(lifted, |hit| scene.absorbs(hit));
     (!inside).then_some(Receiver { position, normal, response: Response::Cosine })
 }
+
+#[cfg(test)]
+mod tests;

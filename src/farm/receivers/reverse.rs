@@ -43,7 +43,7 @@ impl ReceiverSet {
             let stratum = ((k + turn) % u64::from(strata * strata)) as u32;
             let (seen, receiver) = self.look_from(scene, bin as usize, stratum, &mut rng);
             let found = receiver.map_or(Found::default(), |r| path(scene, transport, &r, &mut rng));
-            paths.add(seen, receiver.is_some(), &found, watched);
+            paths.add(seen, receiver.is_some() && scene.reflects(), &found, watched);
         }
         paths.divide_by(self.histories);
         paths
