@@ -32,8 +32,9 @@ fn cut(mut lines: Vec<String>, what: &str, file: &str) -> Vec<String> {
 
 fn grid_line(set: &SetSummary) -> Option<String> {
     let OfGrid { mean, min, uniformity, .. } = set.of_set.derived.as_ref()?;
-    let (mean, min, uo) = (about(mean, &format!(" {}", set.unit)), between(min), between(uniformity));
-    Some(format!("    {}: mean {mean}, min {min} {}, Uo {uo}", set.name, set.unit))
+    let unit = format!(" {}", set.unit);
+    let (mean, min, uo) = (about(mean, &unit), between(min, &unit), between(uniformity, ""));
+    Some(format!("    {}: mean {mean}, min {min}, Uo {uo}", set.name))
 }
 
 fn region_line(set: &SetSummary) -> Option<String> {
@@ -56,12 +57,13 @@ fn about(q: &Quantity, unit: &str) -> String {
     }
 }
 
-/// Value (from .. to).
-fn between(q: &Quantity) -> String {
+/// Value (from .. to); `unit` begins with a space, or is empty.
+fn between(q: &Quantity, unit: &str) -> String {
+    let [value, low, high] = [q.value, q.ci_lower, q.ci_upper].map(|x| short(x, 4));
     if q.ci_lower.is_finite() && q.ci_upper.is_finite() {
-        format!("{} ({} .. {}){}", short(q.value, 4), short(q.ci_lower, 4), short(q.ci_upper, 4), marks(q))
+        format!("{value} ({low} .. {high}){unit}{}", marks(q))
     } else {
-        format!("{} ({})", short(q.value, 4), reason(q))
+        format!("{value}{unit} ({})", reason(q))
     }
 }
 
