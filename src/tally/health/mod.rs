@@ -53,8 +53,8 @@ pub const SLOPE: f64 = 3.0;
 /// Variance of the variance of single histories up to which the slope of their tail is no matter \[1\]: where the
 /// variance is infinite it stays near 0.1 and above, however many they are.
 pub const NEGLIGIBLE_VOV: f64 = 0.02;
-/// Largest light that no bound holds and is not marked \[standard errors\]: a tenth of the half-width of an interval
-/// of 95 % that it could spoil if all of it were missing.
+/// Largest light that no bound holds and that is not marked \[standard errors\]: if all of it were missing, an interval of
+/// 95 % would be off by a tenth of its half-width.
 pub const CAUSTIC: f64 = 0.2;
 /// Histories in the narrowest lobe, N alpha^2, from which on its caustics are known well.
 pub const LOBE: f64 = 30.0;
