@@ -93,8 +93,9 @@ impl ReceiverSet {
     }
 }
 
-/// Draws the next path of each of the `continued`: its points as tiles, one for each depth: an owner has at most one point there. Direct light at them is
-/// added to `start`, one entry an owner, and its caustics to `caustic`: every history that the path serves has them.
+/// Draws the next path of each of the `continued`: its points as tiles, one for each depth, where an owner has at most one
+/// point. Direct light at them is added to `start`, one entry an owner, and caustic light to `caustic`: every history that
+/// the path serves has them.
 fn continue_all(
     scene: &Scene,
     continued: &mut [Continued],
