@@ -10,7 +10,8 @@
 //! receivers     bins of a job -> receivers in a scene
 //! regions       parts of maps, one number a batch
 //! pilot         the bound of the kernel, fixed before the run
-//! realization   batch index -> scores: the only parallel computation
+//! local         histories of a batch x receivers of a set -> scores
+//! realization   batch index -> scores: with `local` the only parallel computation
 //! checkpoint    one durable file for each shard
 //! status        headers -> progress
 //! worker        computes one shard
@@ -23,6 +24,7 @@ pub mod coordinator;
 pub mod durable;
 pub mod folder;
 pub mod inputs;
+mod local;
 pub mod merge;
 mod ordering;
 pub mod pilot;

@@ -1,19 +1,20 @@
-//! One realization of a job: the scores of one batch, the only parallel computation.
+//! One realization of a job: the scores of one batch, with [`super::local`] the only parallel computation.
 //!
 //! A batch is computed from its index alone. Its histories are traced in parallel and collected in index order;
 //! then every tile of receivers sums all vertices in index order, so any number of threads gives the same bits.
 //! The other estimators keep to this: a bin follows its own paths, a grid counts the histories in index order.
 //! Each receiver set keeps the order in which its bins share tiles, found once from the centres of its bins.
 
+use super::local;
 use super::ordering::kd_order;
-use super::receivers::{CentreSight, ReceiverSet, TileScores};
+use super::receivers::{CentreSight, ReceiverSet};
 use super::regions::Regions;
 use crate::job::{Channels, Estimator, Job, Sampling};
 use crate::random::sobol::PointSet;
 use crate::random::{Domain, Stream};
 use crate::scene::Scene;
 use crate::tally::{BatchScores, Scores};
-use crate::transport::connection::{Connectors, TILE};
+use crate::transport::connection::Connectors;
 use crate::transport::trajectory::{FluxBalance, Record, Segment, Vertex, trace};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -79,7 +80,12 @@ impl<'a> Realization<'a> {
     fn local(&self, index: u64) -> (Vec<Scores>, FluxBalance) {
         let (histories, flux) = self.connectors(index);
         let sets = self.sets.par_iter().zip(&self.orders_of_bins);
-        (sets.map(|(set, order)| self.score(set, order, index, &histories)).collect(), flux)
+        let channels = if self.job.run.channels == Channels::Rgb { 3 } else { 1 };
+        let rule = (channels, &self.orders);
+        let score = |(set, order): (&ReceiverSet, &Vec<u32>)| {
+            local::score(set, self.scene, order, index, &histories, rule)
+        };
+        (sets.map(score).collect(), flux)
     }
 
     /// Scores by paths from the receivers.
@@ -152,19 +158,6 @@ impl<'a> Realization<'a> {
             (record, flux)
         };
         range.map(trace).collect()
-    }
-
-    /// The scores of one receiver set by connections.
-    fn score(&self, set: &ReceiverSet, order: &[u32], batch: u64, histories: &Connectors) -> Scores {
-        let channels = if self.job.run.channels == Channels::Rgb { 3 } else { 1 };
-        let rule = (channels, &self.orders);
-        let tiles: Vec<TileScores> =
-            order.par_chunks(TILE).map(|bins| set.score_tile(self.scene, bins, batch, histories, rule)).collect();
-        let mut scores = Scores::zero(set.shape());
-        for (bins, tile) in order.chunks(TILE).zip(tiles) {
-            tile.scatter(bins, &set.shape().monitored, &mut scores);
-        }
-        scores
     }
 }
 

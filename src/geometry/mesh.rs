@@ -1,36 +1,37 @@
-//! Triangles in f32 under a binary bounding volume hierarchy of `obvhs`.
+//! Triangles in f32 under a hierarchy of boxes, and single rays through them.
 //!
-//! No ray slips between triangles that share bit-identical corners: the three edge functions of a triangle are
-//! triple products in f64 of f32 corners, and swapping the ends of an edge changes exactly their sign, so the two
-//! neighbours of an edge agree about the side on which a ray passes; a ray on the edge meets both. The boxes of
-//! the hierarchy are inflated by more than its f32 slab test rounds.
+//! Whether a ray crosses a triangle is decided in f64: no ray slips between triangles that share bit-identical corners,
+//! because the three edge functions of a triangle are triple products in f64 of f32 corners, and swapping the ends of an
+//! edge changes exactly their sign, so the two neighbours of an edge agree about the side on which a ray passes; a ray on the
+//! edge meets both. Everything before that, in f32 and for many triangles at once, is conservative.
 
+use super::bvh::{Bvh8, Node, WIDTH};
+use super::planes::{Block, Directions, Extent, Planes};
+use super::simd::{Isa, Kernel, Path, Vector};
 use super::{Hit, Ray, hit};
 use crate::math::{DVec3, Vec3};
-use glam::Vec3A;
-use obvhs::BvhBuildParams;
-use obvhs::aabb::Aabb;
-use obvhs::bvh2::{Bvh2, builder::build_bvh2};
-use obvhs::ray::{Ray as BoxRay, RayHit};
+use smallvec::SmallVec;
 
 /// Triangles and their hierarchy.
 pub struct Mesh {
-    /// In the order of the leaves of the hierarchy.
+    /// In the order of the blocks.
     pub(super) triangles: Vec<Triangle>,
     /// Where each primitive stands in `triangles`.
     place: Vec<u32>,
-    pub(super) bvh: Bvh2,
+    pub(super) bvh: Bvh8,
+    pub(super) blocks: Vec<Block>,
     bounds: (DVec3, DVec3),
     /// The bounds and a little around them, where rays may start.
     near: (DVec3, DVec3),
+    /// More than f64 rounds of a distance from a plane \[m\].
+    pub(super) floor: f32,
+    pub(super) path: Path,
 }
 
-/// A triangle as rays meet it: (normal, x) = offset on its plane.
+/// A triangle as rays meet it.
 pub(super) struct Triangle {
     pub(super) corners: [Vec3; 3],
     primitive: u32,
-    normal: DVec3,
-    offset: f64,
 }
 
 impl Default for Mesh {
@@ -47,15 +48,26 @@ impl Mesh {
             let p = p.as_dvec3();
             (low.min(p), high.max(p))
         });
-        let bvh = build(triangles, bounds);
+        let diagonal = (bounds.1 - bounds.0).length();
+        let size = bounds.0.abs().max(bounds.1.abs()).max_element() + diagonal;
+        // Twice the scene is the longest way of a ray inside it; 8 roundings of that are more than a test of a box makes.
+        let bvh = Bvh8::new(triangles, (8.0 / f64::from(1 << 24) * 2.0 * size) as f32);
         let mut place = vec![0; triangles.len()];
-        for (at, &primitive) in bvh.primitive_indices.iter().enumerate() {
+        for (at, &primitive) in bvh.order.iter().enumerate() {
             place[primitive as usize] = at as u32;
         }
-        let ordered = bvh.primitive_indices.iter().map(|&p| Triangle::new(triangles[p as usize], p));
+        let ordered = bvh.order.iter().map(|&p| Triangle { corners: triangles[p as usize], primitive: p });
+        let ordered: Vec<Triangle> = ordered.collect();
+        let block = |number: u32| {
+            let corners: Vec<_> = ordered[bvh.block(number)].iter().map(|t| t.corners).collect();
+            Block::new(&corners)
+        };
+        let blocks = (0..bvh.firsts.len() as u32 - 1).map(block).collect();
         let around = 0.01 * (bounds.1 - bounds.0).max_element();
         let near = (bounds.0 - around, bounds.1 + around);
-        Mesh { triangles: ordered.collect(), place, bvh, bounds, near }
+        let floor = (size / (1u64 << 46) as f64) as f32;
+        let path = Path::chosen().unwrap_or(Path::Scalar);
+        Mesh { triangles: ordered, place, bvh, blocks, bounds, near, floor, path }
     }
 
     /// Number of triangles.
@@ -70,8 +82,8 @@ impl Mesh {
 
     /// Memory \[bytes\].
     pub fn bytes(&self) -> u64 {
-        let bvh = size_of_val(&self.bvh.nodes[..]) + size_of_val(&self.bvh.primitive_indices[..]);
-        (size_of_val(&self.triangles[..]) + size_of_val(&self.place[..]) + bvh) as u64
+        let blocks = size_of_val(&self.blocks[..]);
+        (size_of_val(&self.triangles[..]) + size_of_val(&self.place[..]) + blocks + self.bvh.bytes()) as u64
     }
 
     pub(super) fn bounds(&self) -> (DVec3, DVec3) {
@@ -97,7 +109,7 @@ impl Mesh {
         (enter <= leave).then_some((enter, leave))
     }
 
-    fn is_near(&self, p: DVec3) -> bool {
+    pub(super) fn is_near(&self, p: DVec3) -> bool {
         p.cmpge(self.near.0).all() && p.cmple(self.near.1).all()
     }
 
@@ -112,22 +124,8 @@ impl Mesh {
 
     fn closest_hit_near(&self, ray: &Ray) -> Option<Hit> {
         // Boxes and triangles must see the same ray, or a ray could pass between a box and its triangle.
-        let (origin, direction) = (ray.origin.as_vec3a(), ray.direction.as_vec3a());
-        let (o, d) = (origin.as_dvec3(), direction.as_dvec3());
-        let mut best: Option<(f64, u32)> = None;
-        let box_ray = BoxRay::new_inf(origin, direction);
-        self.bvh.ray_traverse(box_ray, &mut RayHit::none(), |_, at| {
-            let triangle = &self.triangles[at];
-            let limit = best.map_or(f64::INFINITY, |(t, _)| t);
-            let Some(t) = triangle.intersect(o, d, limit) else { return f32::INFINITY };
-            let found = (t, triangle.primitive);
-            if best.is_none_or(|b| found < b) {
-                best = Some(found);
-            }
-            // Rounded up: a box that begins at this very distance may hold a lower primitive number.
-            (t * (1.0 + 1e-6)) as f32
-        });
-        let (distance, primitive) = best?;
+        let (origin, direction) = (ray.origin.as_vec3(), ray.direction.as_vec3());
+        let (distance, primitive) = self.path.run(Closest { mesh: self, origin, direction })?;
         let [a, b, c] = self.triangle(primitive);
         let normal = (b - a).cross(c - a).normalize();
         let near = ray.origin + distance * ray.direction;
@@ -139,59 +137,198 @@ impl Mesh {
     pub(super) fn blocks(&self, a: Vec3, b: Vec3) -> bool {
         let (o, end) = (a.as_dvec3(), b.as_dvec3());
         if self.is_near(o) && self.is_near(end) {
-            return self.blocks_near(a, b);
+            return self.path.run(Any { mesh: self, origin: a, direction: b - a });
         }
         let clipped = self.clip(o, end - o, 1.0);
         clipped.is_some_and(|(enter, leave)| {
-            self.blocks_near((o + enter * (end - o)).as_vec3(), (o + leave * (end - o)).as_vec3())
-        })
-    }
-
-    fn blocks_near(&self, a: Vec3, b: Vec3) -> bool {
-        let (o, d) = (a.as_dvec3(), (b - a).as_dvec3());
-        let box_ray = BoxRay::new(a.into(), (b - a).into(), 0.0, 1.0);
-        !self.bvh.ray_traverse_miss(box_ray, |_, at| match self.triangles[at].intersect(o, d, 1.0) {
-            Some(t) if t < 1.0 => 0.0,
-            _ => f32::INFINITY,
+            let (a, b) = ((o + enter * (end - o)).as_vec3(), (o + leave * (end - o)).as_vec3());
+            self.path.run(Any { mesh: self, origin: a, direction: b - a })
         })
     }
 }
 
-fn build(triangles: &[[Vec3; 3]], bounds: (DVec3, DVec3)) -> Bvh2 {
-    if triangles.is_empty() {
-        return Bvh2::default();
+/// A ray in f32 on its way through the boxes.
+struct BoxRay<I: Isa> {
+    origin: [I::Eight; 3],
+    inverse: [I::Eight; 3],
+}
+
+impl<I: Isa> BoxRay<I> {
+    #[inline(always)]
+    fn new(origin: Vec3, direction: Vec3) -> Self {
+        let splat = |v: Vec3| [I::Eight::splat(v.x), I::Eight::splat(v.y), I::Eight::splat(v.z)];
+        BoxRay { origin: splat(origin), inverse: splat(1.0 / direction) }
     }
-    // Twice the scene is the longest way of a ray inside it; 8 roundings of that are more than a slab test makes.
-    let size = bounds.0.abs().max(bounds.1.abs()).max_element() + (bounds.1 - bounds.0).length();
-    let margin = Vec3A::splat((8.0 / f64::from(1 << 24) * 2.0 * size) as f32);
-    let boxes: Vec<Aabb> = triangles
-        .iter()
-        .map(|t| {
-            let tight = Aabb::from_points(&t.map(Vec3A::from));
-            Aabb::new(tight.min - margin, tight.max + margin)
-        })
-        .collect();
-    build_bvh2(&boxes, BvhBuildParams::medium_build(), &mut Default::default())
+
+    /// The boxes of `node` that the ray meets before `end`, and when.
+    #[inline(always)]
+    fn meets(&self, node: &Node, end: f32) -> (u32, [f32; WIDTH]) {
+        let (mut enter, mut leave) = (I::Eight::splat(0.0), I::Eight::splat(end));
+        for axis in 0..3 {
+            let low = I::Eight::load(&node.low[axis]).sub(self.origin[axis]).mul(self.inverse[axis]);
+            let high = I::Eight::load(&node.high[axis]).sub(self.origin[axis]).mul(self.inverse[axis]);
+            enter = low.min(high).max(enter);
+            leave = low.max(high).min(leave);
+        }
+        let mut times = [0.0; WIDTH];
+        enter.store(&mut times);
+        (!leave.less(enter.mul(I::Eight::splat(1.0 - 1e-6))) & node.boxes, times)
+    }
+}
+
+/// The triangles of box `slot` of `node` that the ray from `origin` along `direction` may cross.
+#[inline(always)]
+fn candidates<I: Isa>(mesh: &Mesh, node: &Node, slot: usize, origin: Vec3, direction: Vec3) -> (usize, u32) {
+    let (apex, d) = (origin.to_array(), direction.to_array());
+    let side = |sides: &[[f32; WIDTH]; 3]| [sides[0][slot], sides[1][slot], sides[2][slot]];
+    let extent = Extent::new(apex, side(&node.low), side(&node.high));
+    let number = node.child[slot];
+    let block = &mesh.blocks[number as usize];
+    let planes = Planes::<I>::new(block, apex, extent, &Directions::new(d, d), mesh.floor);
+    let there = (1u32 << node.triangles[slot]) - 1;
+    (mesh.bvh.firsts[number as usize] as usize, planes.along(d) & there)
+}
+
+/// The numbers of the bits that are set.
+#[inline(always)]
+pub(super) fn bits(mask: u32) -> Bits {
+    Bits(mask)
+}
+
+/// See [`bits`].
+pub(super) struct Bits(u32);
+
+impl Iterator for Bits {
+    type Item = usize;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<usize> {
+        if self.0 == 0 {
+            return None;
+        }
+        let bit = self.0.trailing_zeros() as usize;
+        self.0 &= self.0 - 1;
+        Some(bit)
+    }
+}
+
+/// Nodes that wait for a ray; memory is asked for only in hierarchies of unusual depth.
+type Stack<T> = SmallVec<[T; 96]>;
+
+/// The nearest triangle along a ray: distance and primitive.
+struct Closest<'a> {
+    mesh: &'a Mesh,
+    origin: Vec3,
+    direction: Vec3,
+}
+
+impl Kernel for Closest<'_> {
+    type Output = Option<(f64, u32)>;
+
+    #[inline(always)]
+    fn run<I: Isa>(self) -> Option<(f64, u32)> {
+        let Closest { mesh, origin, direction } = self;
+        let (o, d) = (origin.as_dvec3(), direction.as_dvec3());
+        let ray = BoxRay::<I>::new(origin, direction);
+        let mut best: Option<(f64, u32)> = None;
+        // A box that begins at this very distance may hold a lower primitive number, hence the rounding up.
+        let mut end = f32::INFINITY;
+        let mut stack: Stack<(f32, u32)> = Stack::new();
+        if !mesh.is_empty() {
+            stack.push((0.0, 0));
+        }
+        while let Some((time, number)) = stack.pop() {
+            if time > end {
+                continue;
+            }
+            let node = &mesh.bvh.nodes[number as usize];
+            let (met, times) = ray.meets(node, end);
+            for slot in bits(met & node.blocks) {
+                let (first, may) = candidates::<I>(mesh, node, slot, origin, direction);
+                for lane in bits(may) {
+                    let triangle = &mesh.triangles[first + lane];
+                    let limit = best.map_or(f64::INFINITY, |(t, _)| t);
+                    let Some(t) = triangle.intersect(o, d, limit) else { continue };
+                    if best.is_none_or(|b| (t, triangle.primitive) < b) {
+                        best = Some((t, triangle.primitive));
+                        end = (t * (1.0 + 1e-6)) as f32;
+                    }
+                }
+            }
+            push_sorted(&mut stack, bits(met & !node.blocks).map(|slot| (times[slot], node.child[slot])));
+        }
+        best
+    }
+}
+
+/// Pushes nodes, the nearest last.
+#[inline(always)]
+fn push_sorted(stack: &mut Stack<(f32, u32)>, nodes: impl Iterator<Item = (f32, u32)>) {
+    let bottom = stack.len();
+    for node in nodes {
+        stack.push(node);
+        let mut at = stack.len() - 1;
+        while at > bottom && stack[at - 1].0 < node.0 {
+            stack.swap(at - 1, at);
+            at -= 1;
+        }
+    }
+}
+
+/// Whether any triangle crosses a segment.
+struct Any<'a> {
+    mesh: &'a Mesh,
+    origin: Vec3,
+    direction: Vec3,
+}
+
+impl Kernel for Any<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<I: Isa>(self) -> bool {
+        let Any { mesh, origin, direction } = self;
+        let (o, d) = (origin.as_dvec3(), direction.as_dvec3());
+        let ray = BoxRay::<I>::new(origin, direction);
+        let mut stack: Stack<u32> = Stack::new();
+        if !mesh.is_empty() {
+            stack.push(0);
+        }
+        while let Some(number) = stack.pop() {
+            let node = &mesh.bvh.nodes[number as usize];
+            let (met, _) = ray.meets(node, 1.0);
+            for slot in bits(met & node.blocks) {
+                let (first, may) = candidates::<I>(mesh, node, slot, origin, direction);
+                if bits(may).any(|lane| mesh.triangles[first + lane].crosses(o, d)) {
+                    return true;
+                }
+            }
+            stack.extend(bits(met & !node.blocks).map(|slot| node.child[slot]));
+        }
+        false
+    }
 }
 
 impl Triangle {
-    fn new(corners: [Vec3; 3], primitive: u32) -> Self {
-        let [a, b, c] = corners.map(|p| p.as_dvec3());
-        let normal = (b - a).cross(c - a);
-        Triangle { corners, primitive, normal, offset: normal.dot(a) }
-    }
-
     /// Parameter 0 < t <= limit at which the line o + t d crosses the triangle, edges included.
     #[inline(always)]
     fn intersect(&self, o: DVec3, d: DVec3, limit: f64) -> Option<f64> {
-        let t = (self.offset - self.normal.dot(o)) / self.normal.dot(d);
+        let [a, b, c] = self.corners.map(|p| p.as_dvec3());
+        let normal = (b - a).cross(c - a);
+        let t = (normal.dot(a) - normal.dot(o)) / normal.dot(d);
         // Edge-on the quotient is infinite or undefined: a triangle seen edge-on is not there.
         if !(t > 0.0 && t <= limit && t.is_finite()) {
             return None;
         }
-        let [a, b, c] = self.corners.map(|p| p.as_dvec3() - o);
+        let (a, b, c) = (a - o, b - o, c - o);
         let edges = [d.dot(c.cross(b)), d.dot(a.cross(c)), d.dot(b.cross(a))];
         let one_side = edges.iter().all(|&e| e >= 0.0) || edges.iter().all(|&e| e <= 0.0);
         one_side.then_some(t)
+    }
+
+    /// True when the segment from `o` along `d` crosses the triangle, edges included and ends excluded.
+    #[inline(always)]
+    pub(super) fn crosses(&self, o: DVec3, d: DVec3) -> bool {
+        self.intersect(o, d, 1.0).is_some_and(|t| t < 1.0)
     }
 }

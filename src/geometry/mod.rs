@@ -9,16 +9,22 @@
 //! point on an infinite plane lies farther out. That is a few roundings of an f32 coordinate; the distance, cosines
 //! and geometric factor of a connection use the points themselves.
 
+mod bvh;
 mod mesh;
 mod plane;
+mod planes;
 mod proximity;
+mod shaft;
+pub mod simd;
 mod sphere;
+pub mod visibility;
 
 pub use mesh::Mesh;
 pub use plane::Plane;
 pub use sphere::Sphere;
 
 use crate::math::{DVec3, Vec3};
+use simd::Path;
 
 /// Lift of a surface point in units of its coordinate size.
 const LIFT: f64 = 16.0 / (1u64 << 24) as f64;
@@ -131,15 +137,15 @@ impl Geometry {
             && !self.mesh.blocks(a, b)
     }
 
-    /// Sets `factors[i]` to 0 where the segment from `apex` to `points[i]` is blocked; what is 0 is not looked at.
-    ///
-    /// This is the whole interface of the hot kernel: one lifted vertex against a tile of lifted receivers.
-    pub fn shadow(&self, apex: Vec3, points: &[Vec3], factors: &mut [f32]) {
-        for (factor, &point) in factors.iter_mut().zip(points) {
-            if *factor != 0.0 && !self.visible(apex, point) {
-                *factor = 0.0;
-            }
-        }
+    /// The same geometry with its kernels on `path`, which the processor must have: for tests.
+    pub fn with_path(mut self, path: Path) -> Self {
+        self.mesh.path = path;
+        self
+    }
+
+    /// Instructions of its kernels.
+    pub fn path(&self) -> Path {
+        self.mesh.path
     }
 
     /// True when the first surface along each of 14 fixed directions is met from behind, on a side that `absorbs`:

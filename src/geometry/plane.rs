@@ -34,6 +34,7 @@ impl Plane {
 
     /// True when the segment crosses the plane.
     pub(super) fn blocks(&self, a: Vec3, b: Vec3) -> bool {
-        self.height(a.as_dvec3()) * self.height(b.as_dvec3()) < 0.0
+        let (a, b) = (self.height(a.as_dvec3()), self.height(b.as_dvec3()));
+        (a < 0.0 && b > 0.0) || (a > 0.0 && b < 0.0)
     }
 }

@@ -5,8 +5,7 @@
 //! the whole surface, "yes" may be a false alarm. Visibility is not looked at.
 
 use super::{Geometry, Mesh, Plane, Sphere};
-use crate::math::DVec3;
-use obvhs::aabb::Aabb;
+use crate::math::{DVec3, Vec3};
 
 /// What rounding makes of zero, relative to the size of what is compared.
 const NIL: f64 = 1e-9;
@@ -68,27 +67,23 @@ impl Mesh {
         if self.is_empty() || position.cmplt(low - reach).any() || position.cmpgt(high + reach).any() {
             return false;
         }
-        let around = half_ball(position + 0.5 * floor * normal, normal, reach + floor);
-        let mut found = false;
-        self.bvh.aabb_traverse(around, |bvh, node| {
-            let node = &bvh.nodes[node as usize];
-            let leaf = node.first_index as usize..(node.first_index + node.prim_count) as usize;
-            let corners = self.triangles[leaf].iter().map(|t| t.corners.map(|c| c.as_dvec3() - position));
-            found = corners.into_iter().any(|c| greatest_factor(&c, normal, floor) > bound);
-            !found
-        });
-        found
+        let (low, high) = half_ball(position + 0.5 * floor * normal, normal, reach + floor);
+        let exceeds = |block: u32| {
+            let corners = self.triangles[self.bvh.block(block)].iter().map(|t| t.corners.map(|c| c.as_dvec3() - position));
+            corners.into_iter().any(|c| greatest_factor(&c, normal, floor) > bound)
+        };
+        self.bvh.blocks_in(low, high).any(exceeds)
     }
 }
 
 /// A box around the points within `reach` of `position` that lie above the plane through it with `normal`. Half the height
 /// above which surfaces count is room enough for rounding to f32, and the surface on which a receiver stands, however
 /// finely divided, lies outside the box where it runs along two axes.
-fn half_ball(position: DVec3, normal: DVec3, reach: f64) -> Aabb {
+fn half_ball(position: DVec3, normal: DVec3, reach: f64) -> (Vec3, Vec3) {
     // Along an axis at the angle a to the normal the half ball extends 1 forwards and sin a backwards.
     let backwards = (DVec3::ONE - normal * normal).max(DVec3::ZERO).map(f64::sqrt);
     let extent = |n: DVec3| DVec3::select(n.cmpgt(DVec3::ZERO), backwards, DVec3::ONE) * (reach * (1.0 + 1e-6));
-    Aabb::new((position - extent(normal)).as_vec3a(), (position + extent(-normal)).as_vec3a())
+    ((position - extent(normal)).as_vec3(), (position + extent(-normal)).as_vec3())
 }
 
 /// A number that no geometric factor between the origin with `normal` and the triangle exceeds \[1/m2\].

@@ -31,6 +31,11 @@ impl Sphere {
         Some(hit(ray, distance, self.center + self.radius * outward, normal))
     }
 
+    /// True inside.
+    pub(super) fn contains(&self, p: DVec3) -> bool {
+        (p - self.center).length_squared() < self.radius * self.radius
+    }
+
     /// True when the segment crosses the surface: some of it, but not all of it, lies inside, or both ends lie
     /// outside and the middle does not.
     pub(super) fn blocks(&self, a: Vec3, b: Vec3) -> bool {

@@ -10,19 +10,20 @@
 //! summed beside, for the health of the result.
 //!
 //! Loop order is tile -> history -> vertex: a tile stays in the first cache, a history's vertices are summed in f32
-//! (one channel or three), and its total goes once, in f64, to the owner. Sums run in the order of the histories, so
-//! scores do not depend on how histories are split or by whom tiles are computed. Plain f32 operations without
-//! contraction give the same bits whatever the width of the vectors they are compiled to.
+//! (one channel or three), and its total goes once, in f64, to the sum of the link. Sums run in the order of the histories, so
+//! scores do not depend on by whom tiles are computed. Numbers come from plain f32 operations without contraction, which give the
+//! same bits whatever the width of the vectors they are compiled to; see [`crate::geometry::simd`].
 
 use super::receiver::Receiver;
 use super::trajectory::Vertex;
+use crate::geometry::simd::{Isa, Kernel, Vector};
+use crate::geometry::visibility::{BUNDLE, BUNDLES, Lanes, Points, Scratch};
 use crate::math::{PI, Vec3};
 use crate::photometry::Colour;
 use crate::scene::Scene;
 use std::ops::Range;
 
-/// Receivers of one tile.
-pub const TILE: usize = 256;
+pub use crate::geometry::visibility::TILE;
 
 /// A vertex as the kernel wants it.
 #[derive(Clone, Copy, Debug)]
@@ -91,23 +92,24 @@ fn connector(scene: &Scene, v: &Vertex) -> Connector {
 #[derive(Clone, Copy, Debug)]
 pub struct Link {
     /// Number of the owner.
-    pub owner: usize,
+    pub owner: u32,
     /// Where the histories are connected to.
     pub receiver: Receiver,
+    /// What every history has here before it is connected: direct light at a point of a continuation \[lx or cd/m2\].
+    pub start: Colour,
+    /// True where the total of every history is wanted.
+    pub watched: bool,
 }
 
-/// What histories give one owner \[lx or cd/m2\]: sums over histories, not yet divided by their number. `mirrored` and `continued` are for
-/// [`Connected::unbounded`] alone.
+/// What histories give one link \[lx or cd/m2\]: sums over histories, not yet divided by their number.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Connected {
     /// Sum of the totals of all histories.
     pub sum: Colour,
     /// The largest luminous total of a single history.
     pub peak: f64,
-    /// Where histories met mirrors, the luminous part of `sum` by vertices that a delta scatterer lit straight.
+    /// The luminous part of `sum` by vertices that a delta scatterer lit straight.
     pub mirrored: f64,
-    /// Where histories met mirrors, the luminous part of `sum` that came by continuations.
-    pub continued: f64,
     /// The luminous total of every history, where it is wanted.
     pub totals: Option<Vec<f64>>,
 }
@@ -123,103 +125,161 @@ pub struct Rule {
     pub orders: Range<u32>,
 }
 
-/// Connects the `histories` of `connectors` to all links in `tiles`; entry i of `connected` belongs to owner i, and entry i of
-/// `start` is what every history has there before it is connected: direct light at the points of a continuation.
-///
-/// # Panics
-/// With more than [`TILE`] owners.
+/// Connects the `histories` of `connectors` to all links of `tile`: entry i belongs to link i.
 pub fn connect(
     scene: &Scene,
     connectors: &Connectors,
     histories: Range<usize>,
-    tiles: &[&Tile],
+    tile: &Tile,
     rule: &Rule,
-    start: &[Colour],
-    connected: &mut [Connected],
-) {
-    assert!(start.len() == connected.len() && start.len() <= TILE, "at most {TILE} owners");
+) -> Vec<Connected> {
+    let connection = Connection { scene, connectors, histories, tile, rule };
     match rule.channels {
-        1 => connect_channels::<1>(scene, connectors, histories, tiles, rule, start, connected),
-        _ => connect_channels::<3>(scene, connectors, histories, tiles, rule, start, connected),
+        1 => scene.geometry.path().run(Channels::<1>(connection)),
+        _ => scene.geometry.path().run(Channels::<3>(connection)),
     }
 }
 
-fn connect_channels<const C: usize>(
-    scene: &Scene,
-    connectors: &Connectors,
+struct Connection<'a> {
+    scene: &'a Scene,
+    connectors: &'a Connectors,
     histories: Range<usize>,
-    tiles: &[&Tile],
-    rule: &Rule,
-    start: &[Colour],
-    connected: &mut [Connected],
-) {
-    let mut sums = Sums::<C>::new();
-    let mut totals = [Colour::BLACK; TILE];
-    // Where nothing is known beforehand and nobody counts histories, those without vertices need not be looked at.
-    let idle = start.iter().all(|c| c.is_black()) && connected.iter().all(|c| c.totals.is_none());
-    for history in connectors.iter(histories).filter(|h| !(idle && h.is_empty())) {
-        let totals = &mut totals[..connected.len()];
-        totals.copy_from_slice(start);
-        for tile in tiles {
-            sums.clear(tile.links.len());
+    tile: &'a Tile,
+    rule: &'a Rule,
+}
+
+/// A connection in `C` channels.
+struct Channels<'a, const C: usize>(Connection<'a>);
+
+impl<const C: usize> Kernel for Channels<'_, C> {
+    type Output = Vec<Connected>;
+
+    #[inline(always)]
+    fn run<I: Isa>(self) -> Vec<Connected> {
+        let Connection { scene, connectors, histories, tile, rule } = self.0;
+        let mut sums = Sums::<C>::new();
+        let mut totals = Totals::<C>::new(tile);
+        let mut scratch = Scratch::default();
+        // Where nothing is known beforehand and nobody counts histories, those without vertices need not be looked at.
+        let idle = tile.links.iter().all(|l| l.start.is_black() && !l.watched);
+        for history in connectors.iter(histories).filter(|h| !(idle && h.is_empty())) {
+            sums.clear();
             for vertex in history.iter().filter(|v| rule.orders.contains(&(v.order + tile.depth))) {
-                tile.add(scene, vertex, rule.bound as f32, &mut sums);
+                tile.add::<I, C>(scene, vertex, rule.bound as f32, &mut sums, &mut scratch);
             }
-            tile.add_totals(&sums.light, |owner, total| totals[owner] += total);
-            if sums.has_mirrored {
-                tile.add_totals(&sums.mirrored, |owner, total| connected[owner].mirrored += total.luminance());
-            }
-            if connectors.mirrored && tile.depth > 0 {
-                tile.add_totals(&sums.light, |owner, total| connected[owner].continued += total.luminance());
-            }
+            totals.add(&sums, tile);
         }
-        if connectors.mirrored {
-            connected.iter_mut().zip(start).for_each(|(into, start)| into.continued += start.luminance());
-        }
-        for (total, into) in totals.iter().zip(&mut *connected) {
-            into.add(*total);
-        }
+        totals.connected(tile)
     }
 }
 
-impl Connected {
-    /// About the luminous light that no bound holds, as a sum over histories: of what a mirror sends to the surfaces around
-    /// the receiver, the share that continuations bring of all other light.
-    pub fn unbounded(&self) -> f64 {
-        // Nothing was mirrored where nothing came at all.
-        if self.mirrored > 0.0 { self.mirrored * self.continued / self.sum.luminance() } else { 0.0 }
-    }
-
-    /// Takes in the total of one history.
-    fn add(&mut self, total: Colour) {
-        self.sum += total;
-        self.peak = self.peak.max(total.luminance());
-        if let Some(totals) = &mut self.totals {
-            totals.push(total.luminance());
-        }
-    }
-}
+/// f32 lanes of a tile.
+type Column = [[f32; BUNDLE]; BUNDLES];
 
 /// What one history gives the links of a tile, constant responses left out.
 struct Sums<const C: usize> {
-    light: [[f32; TILE]; C],
+    light: [Column; C],
     /// The part of `light` by vertices that a delta scatterer lit straight.
-    mirrored: [[f32; TILE]; C],
+    mirrored: [Column; C],
     has_mirrored: bool,
 }
 
 impl<const C: usize> Sums<C> {
     fn new() -> Self {
-        Sums { light: [[0.0; TILE]; C], mirrored: [[0.0; TILE]; C], has_mirrored: false }
+        let zero = [[[0.0; BUNDLE]; BUNDLES]; C];
+        Sums { light: zero, mirrored: zero, has_mirrored: false }
     }
 
-    /// Back to zero for a tile of `links`.
-    fn clear(&mut self, links: usize) {
-        self.light.iter_mut().for_each(|s| s[..links].fill(0.0));
+    #[inline(always)]
+    fn clear(&mut self) {
+        self.light = [[[0.0; BUNDLE]; BUNDLES]; C];
         if std::mem::take(&mut self.has_mirrored) {
-            self.mirrored.iter_mut().for_each(|s| s[..links].fill(0.0));
+            self.mirrored = [[[0.0; BUNDLE]; BUNDLES]; C];
         }
     }
+}
+
+/// What all histories so far give the links of a tile, lane by lane.
+struct Totals<const C: usize> {
+    constant: [[f64; TILE]; C],
+    start: [[f64; TILE]; C],
+    sum: [[f64; TILE]; C],
+    /// Of the history at hand, the luminous total.
+    total: [f64; TILE],
+    peak: [f64; TILE],
+    mirrored: [f64; TILE],
+    watched: Vec<(usize, Vec<f64>)>,
+}
+
+impl<const C: usize> Totals<C> {
+    fn new(tile: &Tile) -> Self {
+        let column = |of: &dyn Fn(usize) -> Colour| {
+            let mut columns = [[0.0; TILE]; C];
+            for i in 0..tile.links.len() {
+                columns.iter_mut().zip(of(i).0).for_each(|(column, value)| column[i] = value);
+            }
+            columns
+        };
+        let watched = tile.links.iter().enumerate().filter(|(_, l)| l.watched);
+        Totals {
+            constant: column(&|i| tile.constant[i].unwrap_or(Colour::WHITE)),
+            start: column(&|i| tile.links[i].start),
+            sum: [[0.0; TILE]; C],
+            total: [0.0; TILE],
+            peak: [0.0; TILE],
+            mirrored: [0.0; TILE],
+            watched: watched.map(|(i, _)| (i, Vec::new())).collect(),
+        }
+    }
+
+    /// Takes in what one history gave.
+    #[inline(always)]
+    fn add(&mut self, sums: &Sums<C>, tile: &Tile) {
+        let lanes = tile.bundles() * BUNDLE;
+        let lanes = lanes.min(TILE);
+        for i in 0..lanes {
+            let mut total = [0.0; C];
+            for c in 0..C {
+                total[c] = self.start[c][i] + f64::from(sums.light[c].as_flattened()[i]) * self.constant[c][i];
+                self.sum[c][i] += total[c];
+            }
+            self.total[i] = luminance(total);
+            self.peak[i] = if self.total[i] > self.peak[i] { self.total[i] } else { self.peak[i] };
+        }
+        for (i, totals) in &mut self.watched {
+            totals.push(self.total[*i]);
+        }
+        if sums.has_mirrored {
+            for i in 0..lanes {
+                let part = |c: usize| f64::from(sums.mirrored[c].as_flattened()[i]) * self.constant[c][i];
+                self.mirrored[i] += luminance(std::array::from_fn::<f64, C, _>(part));
+            }
+        }
+    }
+
+    /// Link by link.
+    fn connected(mut self, tile: &Tile) -> Vec<Connected> {
+        let mut watched = std::mem::take(&mut self.watched).into_iter().peekable();
+        let of_link = |i: usize| Connected {
+            sum: colour(std::array::from_fn::<f64, C, _>(|c| self.sum[c][i])),
+            peak: self.peak[i],
+            mirrored: self.mirrored[i],
+            totals: watched.next_if(|(at, _)| *at == i).map(|(_, totals)| totals),
+        };
+        (0..tile.links.len()).map(of_link).collect()
+    }
+}
+
+/// The colour of one channel, or of three.
+#[inline(always)]
+fn colour<const C: usize>(channels: [f64; C]) -> Colour {
+    Colour(std::array::from_fn(|c| channels[c.min(C - 1)]))
+}
+
+/// The luminance of one channel, or of three.
+#[inline(always)]
+fn luminance<const C: usize>(channels: [f64; C]) -> f64 {
+    if C == 1 { channels[0] } else { colour(channels).luminance() }
 }
 
 /// At most [`TILE`] links as a structure of arrays.
@@ -228,13 +288,9 @@ pub struct Tile {
     links: Vec<Link>,
     /// Reflections between these receivers and their owners.
     depth: u32,
-    x: [f32; TILE],
-    y: [f32; TILE],
-    z: [f32; TILE],
-    normal_x: [f32; TILE],
-    normal_y: [f32; TILE],
-    normal_z: [f32; TILE],
-    lifted: Vec<Vec3>,
+    position: [Column; 3],
+    normal: [Column; 3],
+    lifted: Points,
     /// Response of each receiver where it does not depend on direction.
     constant: Vec<Option<Colour>>,
     all_constant: bool,
@@ -246,81 +302,122 @@ impl Tile {
         assert!(links.len() <= TILE, "a tile holds {TILE} receivers");
         let constant: Vec<_> = links.iter().map(|l| l.receiver.response.constant(scene)).collect();
         let column = |f: &dyn Fn(&Receiver) -> f64| {
-            let mut column = [0f32; TILE];
-            column.iter_mut().zip(&links).for_each(|(c, l)| *c = f(&l.receiver) as f32);
+            let mut column: Column = [[0.0; BUNDLE]; BUNDLES];
+            column.as_flattened_mut().iter_mut().zip(&links).for_each(|(c, l)| *c = f(&l.receiver) as f32);
             column
         };
         let lift = |l: &Link| scene.geometry.lift(l.receiver.position, l.receiver.normal).as_vec3();
+        let lifted: Vec<Vec3> = links.iter().map(lift).collect();
         Tile {
             depth,
-            x: column(&|r| r.position.x),
-            y: column(&|r| r.position.y),
-            z: column(&|r| r.position.z),
-            normal_x: column(&|r| r.normal.x),
-            normal_y: column(&|r| r.normal.y),
-            normal_z: column(&|r| r.normal.z),
-            lifted: links.iter().map(lift).collect(),
+            position: [column(&|r| r.position.x), column(&|r| r.position.y), column(&|r| r.position.z)],
+            normal: [column(&|r| r.normal.x), column(&|r| r.normal.y), column(&|r| r.normal.z)],
+            lifted: Points::new(&scene.geometry, &lifted),
             all_constant: constant.iter().all(Option::is_some),
             constant,
             links,
         }
     }
 
+    /// The links, in the order in which they were given.
+    pub fn links(&self) -> &[Link] {
+        &self.links
+    }
+
+    #[inline(always)]
+    fn bundles(&self) -> usize {
+        self.links.len().div_ceil(BUNDLE)
+    }
+
     /// Adds what `vertex` gives each receiver, a constant response left out.
-    fn add<const C: usize>(&self, scene: &Scene, vertex: &Connector, bound: f32, sums: &mut Sums<C>) {
-        let mut factors = [0f32; TILE];
-        let factors = &mut factors[..self.links.len()];
-        self.factors(vertex, factors);
-        scene.geometry.shadow(vertex.lifted, &self.lifted, factors);
+    #[inline(always)]
+    fn add<I: Isa, const C: usize>(
+        &self,
+        scene: &Scene,
+        vertex: &Connector,
+        bound: f32,
+        sums: &mut Sums<C>,
+        scratch: &mut Scratch,
+    ) {
+        let mut factors: Column = [[0.0; BUNDLE]; BUNDLES];
+        let mut seen: Lanes = [0; BUNDLES];
+        self.factors::<I>(vertex, &mut factors, &mut seen);
+        if seen == [0; BUNDLES] {
+            return;
+        }
+        scene.geometry.shadow::<I>(vertex.lifted, &self.lifted, &mut seen, scratch);
+        // No continuation finds what came from a delta scatterer: all of it is connected.
+        let bound = if vertex.after_delta { f32::INFINITY } else { bound };
+        self.spread::<I, C>(scene, vertex, &factors, &seen, bound, &mut sums.light);
         if vertex.after_delta {
             sums.has_mirrored = true;
-            self.spread(scene, vertex, factors, |factor, _| factor, &mut sums.light);
-            self.spread(scene, vertex, factors, |factor, _| factor, &mut sums.mirrored);
-        } else {
-            self.spread(scene, vertex, factors, |factor, peak| factor.min(bound / peak), &mut sums.light);
+            self.spread::<I, C>(scene, vertex, &factors, &seen, bound, &mut sums.mirrored);
         }
     }
 
-    /// Adds to `sums` what `vertex` sends each receiver over the part of its geometric factor that `carried` gives, of the
-    /// factor and of the peaks of both laws.
-    fn spread<const C: usize>(
-        &self,
-        scene: &Scene,
-        vertex: &Connector,
-        factors: &[f32],
-        carried: impl Fn(f32, f32) -> f32,
-        sums: &mut [[f32; TILE]; C],
-    ) {
-        if vertex.glossy.is_none() && self.all_constant {
-            add_constant(sums, &vertex.intensity, factors, |factor| carried(factor, 1.0));
-        } else {
-            self.add_varying(scene, vertex, factors, carried, sums);
-        }
-    }
-
-    /// Geometric factors G without visibility; 0 where vertex or receiver faces away \[1/m2\].
-    fn factors(&self, vertex: &Connector, factors: &mut [f32]) {
-        let (p, n) = (vertex.position, vertex.normal);
-        for i in 0..factors.len().min(TILE) {
-            let (x, y, z) = (self.x[i] - p.x, self.y[i] - p.y, self.z[i] - p.z);
-            let leaving = (n.x * x + n.y * y + n.z * z).max(0.0);
-            let arriving = (-(self.normal_x[i] * x + self.normal_y[i] * y + self.normal_z[i] * z)).max(0.0);
+    /// Geometric factors G without visibility; 0 where vertex or receiver faces away, and not `seen` \[1/m2\].
+    #[inline(always)]
+    fn factors<I: Isa>(&self, vertex: &Connector, factors: &mut Column, seen: &mut Lanes) {
+        let splat = |v: Vec3| [I::Sixteen::splat(v.x), I::Sixteen::splat(v.y), I::Sixteen::splat(v.z)];
+        let (p, n) = (splat(vertex.position), splat(vertex.normal));
+        let zero = I::Sixteen::splat(0.0);
+        for bundle in 0..self.bundles().min(BUNDLES) {
+            let lanes = |columns: &[Column; 3], axis: usize| I::Sixteen::load(&columns[axis][bundle]);
+            let way = |axis: usize| lanes(&self.position, axis).sub(p[axis]);
+            let w = [way(0), way(1), way(2)];
+            let dot = |a: &[I::Sixteen; 3]| a[0].mul(w[0]).add(a[1].mul(w[1])).add(a[2].mul(w[2]));
+            let leaving = dot(&n).max(zero);
+            let normal = [lanes(&self.normal, 0), lanes(&self.normal, 1), lanes(&self.normal, 2)];
+            let arriving = zero.sub(dot(&normal)).max(zero);
             // A receiver at the vertex itself has no direction and gets nothing, not NaN.
-            let inverse = 1.0 / (x * x + y * y + z * z).max(1e-30);
-            factors[i] = (leaving * inverse) * (arriving * inverse);
+            let inverse = I::Sixteen::splat(1.0).div(dot(&w).max(I::Sixteen::splat(1e-30)));
+            let factor = leaving.mul(inverse).mul(arriving.mul(inverse));
+            factor.store(&mut factors[bundle]);
+            seen[bundle] = zero.less(factor) as u16;
         }
     }
 
-    /// Adds what needs the direction of each connection, at the vertex or at the receiver.
-    fn add_varying<const C: usize>(
+    /// Adds to `sums` what `vertex` sends each receiver seen, over its geometric factor up to `bound` over the peaks of both
+    /// laws.
+    #[inline(always)]
+    fn spread<I: Isa, const C: usize>(
         &self,
         scene: &Scene,
         vertex: &Connector,
-        factors: &[f32],
-        carried: impl Fn(f32, f32) -> f32,
-        sums: &mut [[f32; TILE]; C],
+        factors: &Column,
+        seen: &Lanes,
+        bound: f32,
+        sums: &mut [Column; C],
     ) {
-        for (i, &factor) in factors.iter().enumerate().filter(|(_, f)| **f != 0.0) {
+        if vertex.glossy.is_some() || !self.all_constant {
+            return self.spread_varying(scene, vertex, factors, seen, bound, sums);
+        }
+        let most = I::Sixteen::splat(bound);
+        for bundle in 0..self.bundles().min(BUNDLES) {
+            let carried = I::Sixteen::load(&factors[bundle]).min(most).select(u32::from(seen[bundle]));
+            for c in 0..C {
+                let sum = I::Sixteen::load(&sums[c][bundle]);
+                sum.add(carried.mul(I::Sixteen::splat(vertex.intensity[c]))).store(&mut sums[c][bundle]);
+            }
+        }
+    }
+
+    /// The same where it needs the direction of each connection, at the vertex or at the receiver.
+    #[inline(never)]
+    fn spread_varying<const C: usize>(
+        &self,
+        scene: &Scene,
+        vertex: &Connector,
+        factors: &Column,
+        seen: &Lanes,
+        bound: f32,
+        sums: &mut [Column; C],
+    ) {
+        for i in 0..self.links.len() {
+            let (bundle, lane) = (i / BUNDLE, i % BUNDLE);
+            if seen[bundle] >> lane & 1 == 0 {
+                continue;
+            }
             let receiver = &self.links[i].receiver;
             let w = (receiver.position - vertex.position.as_dvec3()).normalize();
             let (mut value, mut peak) = (vertex.intensity, 1.0);
@@ -335,32 +432,10 @@ impl Tile {
                 value = std::array::from_fn(|c| value[c] * response.0[c] as f32);
                 peak *= of_receiver;
             }
-            let carried = carried(factor, peak as f32);
+            let carried = factors[bundle][lane].min(bound / peak as f32);
             for (sum, &v) in sums.iter_mut().zip(&value) {
-                sum[i] += v * carried;
+                sum[bundle][lane] += v * carried;
             }
-        }
-    }
-
-    /// Hands the sums of one history to the owners, link by link.
-    fn add_totals<const C: usize>(&self, sums: &[[f32; TILE]; C], mut add: impl FnMut(usize, Colour)) {
-        for (i, link) in self.links.iter().enumerate() {
-            let sum = Colour(std::array::from_fn(|c| f64::from(sums[c.min(C - 1)][i])));
-            add(link.owner, sum * self.constant[i].unwrap_or(Colour::WHITE));
-        }
-    }
-}
-
-/// Adds `intensity` x carried factor to every receiver.
-fn add_constant<const C: usize>(
-    sums: &mut [[f32; TILE]; C],
-    intensity: &[f32; 3],
-    factors: &[f32],
-    carried: impl Fn(f32) -> f32,
-) {
-    for (sums, &intensity) in sums.iter_mut().zip(intensity) {
-        for (sum, &factor) in sums.iter_mut().zip(factors) {
-            *sum += intensity * carried(factor);
         }
     }
 }

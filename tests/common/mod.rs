@@ -41,13 +41,10 @@ impl Deref for Case {
 
 /// All histories connected to `receivers`, each by itself, with the bound b and nothing else: no continuation.
 pub fn connect(scene: &Scene, histories: &Connectors, bound: f64, receivers: &[Receiver]) -> Vec<Connected> {
-    let links = receivers.iter().enumerate().map(|(owner, &receiver)| Link { owner, receiver }).collect();
-    let tile = Tile::new(scene, links, 0);
+    let link = |(owner, &receiver)| Link { owner, receiver, start: Colour::BLACK, watched: false };
+    let tile = Tile::new(scene, (0..).zip(receivers).map(link).collect(), 0);
     let rule = Rule { bound, channels: 1, orders: 0..u32::MAX };
-    let start = vec![Colour::BLACK; receivers.len()];
-    let mut connected = vec![Connected::default(); receivers.len()];
-    connection::connect(scene, histories, 0..histories.histories(), &[&tile], &rule, &start, &mut connected);
-    connected
+    connection::connect(scene, histories, 0..histories.histories(), &tile, &rule)
 }
 
 pub fn compare(name: impl ToString, estimate: Estimate, reference: f64) -> Comparison {

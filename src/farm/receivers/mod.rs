@@ -2,13 +2,11 @@
 //!
 //! The bin of a map has one position in each of its strata and batch, for direct light; one of them, its stratum
 //! drawn anew each batch, carries the connections. A lux-meter stays where it is, and its direct light from lights
-//! without extent is computed once. How histories are turned into scores is in `local`.
+//! without extent is computed once. How histories are turned into scores is in [`super::local`].
 
 mod horizon;
-mod local;
 mod sight;
 
-pub use local::TileScores;
 pub use sight::CentreSight;
 
 mod crossing;
@@ -51,10 +49,13 @@ enum Bins {
 const DRAWS: u32 = 1 << 16;
 
 /// What the positions of one bin say in one batch.
-struct Sensed {
-    direct: Colour,
-    receiver: Option<Receiver>,
-    existed: bool,
+pub struct Sensed {
+    /// Emission and sampled direct light \[lx or cd/m2\].
+    pub direct: Colour,
+    /// Where the histories are connected to.
+    pub receiver: Option<Receiver>,
+    /// Whether a surface that reflects was there.
+    pub existed: bool,
 }
 
 impl ReceiverSet {
@@ -97,6 +98,16 @@ impl ReceiverSet {
     /// Name, size and keeping.
     pub fn shape(&self) -> &SetShape {
         &self.shape
+    }
+
+    /// b of the bounded kernel \[1/m2\]; infinite where nothing is bounded.
+    pub fn bound(&self) -> f64 {
+        self.bound
+    }
+
+    /// The generator of the continuations of bin `bin` in a batch.
+    pub fn continuation(&self, bin: u32, batch: u64) -> Generator {
+        self.continuations.generator(batch * self.shape.bins() as u64 + u64::from(bin))
     }
 
     /// Where the centre of bin `i` looks, for the order of the tiles alone; infinite where nothing is seen.
@@ -207,7 +218,7 @@ impl ReceiverSet {
     }
 
     /// Direct light and receiver of one bin in one batch.
-    fn sense(&self, scene: &Scene, bin: usize, batch: u64) -> Sensed {
+    pub fn sense(&self, scene: &Scene, bin: usize, batch: u64) -> Sensed {
         let mut rng = self.stream.generator(batch * self.shape.bins() as u64 + bin as u64);
         match &self.bins {
             Bins::Meters(meters) => self.sense_meter(scene, meters[bin].as_ref(), &mut rng),

@@ -1,0 +1,302 @@
+//! Eight triangles as planes through an apex: which of them rays from there may cross, and which they surely do.
+//!
+//! Seen from the apex o, with a = A - o and so on, a segment from o along d crosses the triangle ABC where
+//!
+//! ```text
+//! E_0 = d . (b x c) >= 0,  E_1 = d . (c x a) >= 0,  E_2 = d . (a x b) >= 0,   and  N . d > N . a = V
+//! ```
+//!
+//! for V > 0; for V < 0 all signs turn round. 2 b x c is computed as (b + c) x (C - B), whose error is in proportion to the
+//! length of the edge.
+//!
+//! This is a filter: the answer is [`super::mesh::Triangle::intersect`], in f64. With u = 2^-24, M the largest coordinate of a,
+//! b, c, L that of the edges, and S = |d_x| + |d_y| + |d_z|, first-order analysis of the roundings in f32 gives
+//!
+//! ```text
+//! |error of 2 E_k| <= 32 u M L S      |error of N . d| <= 4 u |N||d|      |error of V| <= 5 u |N||a|      N a unit vector
+//! ```
+//!
+//! (4 u M for b + c, u L for an edge, 20 u M L for each coordinate of their product, 12 u M L S for the scalar product; N is
+//! rounded once from f64.) A test of a whole box of directions adds up to 8 roundings more. The tolerances used are 48 u M L S and
+//! 5.1 u (|a| + |d|), and a little for what f64 rounds. What they leave undecided is asked of f64, and so is everything about a
+//! triangle whose V has no certain sign: a wrong answer is impossible and the instructions used do not matter.
+//!
+//! A lifted point lies 16 u (max |p| + D) off its own surface, D the diagonal of the geometry: more than 10.2 u D, so the
+//! surface that a receiver stands on never needs f64.
+
+use super::bvh::WIDTH;
+use super::simd::{Isa, Vector};
+use crate::math::Vec3;
+
+/// Half the distance between 1 and the next f32.
+const U: f32 = 1.0 / (1 << 24) as f32;
+/// Tolerance of the edges in units of u M L S.
+const EDGE: f32 = 48.0 * U;
+/// Tolerance of the face in units of |a| + |d|.
+const FACE: f32 = 5.1 * U;
+/// What f64 itself rounds: 28 2^-53 M^2 S.
+const EDGE_F64: f32 = U * U;
+/// Keeps tolerances above what underflow loses.
+const TINY: f32 = 1e-36;
+
+/// Eight triangles as a structure of arrays, the corners by corner, axis and lane; unused lanes repeat the first.
+#[derive(Clone, Debug)]
+#[repr(C, align(64))]
+pub(super) struct Block {
+    corners: [[[f32; WIDTH]; 3]; 3],
+    /// Unit normals, the cross products of f64 rounded; 0 for a triangle without area.
+    normal: [[f32; WIDTH]; 3],
+}
+
+impl Block {
+    pub(super) fn new(triangles: &[[Vec3; 3]]) -> Self {
+        let mut block = Block { corners: [[[0.0; WIDTH]; 3]; 3], normal: [[0.0; WIDTH]; 3] };
+        for lane in 0..WIDTH {
+            let corners = triangles.get(lane).unwrap_or(&triangles[0]);
+            let [a, b, c] = corners.map(|p| p.as_dvec3());
+            let normal = (b - a).cross(c - a);
+            // Scaled first: the square of a tiny number is zero.
+            let normal = (normal / normal.abs().max_element()).normalize_or_zero().as_vec3();
+            for axis in 0..3 {
+                block.normal[axis][lane] = if normal.is_finite() { normal[axis] } else { 0.0 };
+                for (corner, p) in corners.iter().enumerate() {
+                    block.corners[corner][axis][lane] = p[axis];
+                }
+            }
+        }
+        block
+    }
+}
+
+/// A box of directions from the apex, by centre and half extent \[m\]: every d of a bundle lies inside.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Directions {
+    pub(super) center: [f32; 3],
+    pub(super) half: [f32; 3],
+    /// An upper bound of S.
+    pub(super) sum: f32,
+    /// An upper bound of |d| \[m\].
+    pub(super) length: f32,
+}
+
+impl Directions {
+    /// The box from `low` to `high`, corner by corner.
+    #[inline(always)]
+    pub(super) fn new(low: [f32; 3], high: [f32; 3]) -> Self {
+        let mut d = Directions { center: [0.0; 3], half: [0.0; 3], sum: 0.0, length: 0.0 };
+        let mut squares = 0.0;
+        for axis in 0..3 {
+            let far = low[axis].abs().max(high[axis].abs());
+            d.center[axis] = 0.5 * (low[axis] + high[axis]);
+            // Wide enough for the rounding of both.
+            d.half[axis] = 0.5 * (high[axis] - low[axis]) * (1.0 + 4.0 * U) + 4.0 * U * far;
+            d.sum += far;
+            squares += far * far;
+        }
+        d.length = squares.sqrt();
+        d
+    }
+}
+
+/// How large the corners of a block are, seen from the apex.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Extent {
+    /// An upper bound of |a|, |b|, |c| \[m\].
+    far: f32,
+    /// M.
+    size: f32,
+    /// L.
+    edge: f32,
+}
+
+impl Extent {
+    /// Of a block in the box from `low` to `high`.
+    #[inline(always)]
+    pub(super) fn new(apex: [f32; 3], low: [f32; 3], high: [f32; 3]) -> Self {
+        let (mut size, mut edge, mut squares) = (0.0f32, 0.0f32, 0.0f32);
+        for axis in 0..3 {
+            let far = (low[axis] - apex[axis]).abs().max((high[axis] - apex[axis]).abs());
+            size = size.max(far);
+            edge = edge.max(high[axis] - low[axis]);
+            squares += far * far;
+        }
+        Extent { far: squares.sqrt(), size, edge }
+    }
+}
+
+/// The planes of a block for one apex; lanes are triangles.
+pub(super) struct Planes<I: Isa> {
+    /// Normals of the planes through the apex and the edges, turned so that inside is positive.
+    edges: [[I::Eight; 3]; 3],
+    /// N, turned away from the apex.
+    face: [I::Eight; 3],
+    /// |V|, the distance of the plane from the apex.
+    volume: I::Eight,
+    /// Bit i: V of triangle i has no certain sign.
+    doubtful: u32,
+    edge_tolerance: f32,
+    face_tolerance: f32,
+}
+
+/// Of eight triangles, the ones that some direction of a box may cross, and those that all surely do.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Against {
+    pub(super) may: u32,
+    pub(super) cover: u32,
+}
+
+impl<I: Isa> Planes<I> {
+    /// The planes of `block`, of size `extent`, for rays from `apex` in `directions`; `floor` is what f64 rounds of
+    /// coordinates \[m\].
+    #[inline(always)]
+    pub(super) fn new(block: &Block, apex: [f32; 3], extent: Extent, directions: &Directions, floor: f32) -> Self {
+        let corner = |k: usize| -> [I::Eight; 3] { load::<I>(&block.corners[k]) };
+        let (a, b, c) = (corner(0), corner(1), corner(2));
+        let o = [I::Eight::splat(apex[0]), I::Eight::splat(apex[1]), I::Eight::splat(apex[2])];
+        let (x, y, z) = (sub::<I>(a, o), sub::<I>(b, o), sub::<I>(c, o));
+        let edges = [
+            cross::<I>(add::<I>(y, z), sub::<I>(c, b)),
+            cross::<I>(add::<I>(z, x), sub::<I>(a, c)),
+            cross::<I>(add::<I>(x, y), sub::<I>(b, a)),
+        ];
+        let face = load::<I>(&block.normal);
+        let volume = dot::<I>(face, x);
+        let Extent { far, size, edge } = extent;
+        Planes {
+            edges: [turn::<I>(edges[0], volume), turn::<I>(edges[1], volume), turn::<I>(edges[2], volume)],
+            face: turn::<I>(face, volume),
+            volume: volume.abs(),
+            doubtful: volume.abs().less(I::Eight::splat(FACE * far + floor)),
+            edge_tolerance: (EDGE * edge + EDGE_F64 * size) * size * directions.sum + TINY,
+            face_tolerance: FACE * (far + directions.length) + floor,
+        }
+    }
+
+    /// All directions of a box at once.
+    #[inline(always)]
+    pub(super) fn against(&self, directions: &Directions) -> Against {
+        let center = splat::<I>(directions.center);
+        let half = splat::<I>(directions.half);
+        let (mut miss, mut cover) = (0, u32::MAX);
+        let tolerance = I::Eight::splat(self.edge_tolerance);
+        let negative = I::Eight::splat(-self.edge_tolerance);
+        for edge in &self.edges {
+            let (middle, spread) = (dot::<I>(*edge, center), dot::<I>(abs::<I>(*edge), half));
+            miss |= middle.add(spread).less(negative);
+            cover &= tolerance.less(middle.sub(spread));
+        }
+        let (middle, spread) = (dot::<I>(self.face, center), dot::<I>(abs::<I>(self.face), half));
+        let tolerance = I::Eight::splat(self.face_tolerance);
+        miss |= middle.add(spread).less(self.volume.sub(tolerance));
+        cover &= self.volume.add(tolerance).less(middle.sub(spread));
+        Against { may: !miss | self.doubtful, cover: cover & !self.doubtful }
+    }
+
+    /// The triangles that the ray along `d`, of any length, may cross.
+    #[inline(always)]
+    pub(super) fn along(&self, d: [f32; 3]) -> u32 {
+        let d = splat::<I>(d);
+        let negative = I::Eight::splat(-self.edge_tolerance);
+        let mut miss = 0;
+        for edge in &self.edges {
+            miss |= dot::<I>(*edge, d).less(negative);
+        }
+        miss |= dot::<I>(self.face, d).less(I::Eight::splat(-self.face_tolerance));
+        !miss | self.doubtful
+    }
+
+    /// To memory, from where single triangles are taken.
+    #[inline(always)]
+    pub(super) fn store(&self, rows: &mut Rows) {
+        for (edge, row) in self.edges.iter().zip(&mut rows.edges) {
+            edge.iter().zip(row).for_each(|(e, row)| e.store(row));
+        }
+        self.face.iter().zip(&mut rows.face).for_each(|(f, row)| f.store(row));
+        self.volume.store(&mut rows.volume);
+        (rows.edge_tolerance, rows.face_tolerance) = (self.edge_tolerance, self.face_tolerance);
+        rows.doubtful = self.doubtful;
+    }
+}
+
+/// [`Planes`] in memory.
+#[derive(Default)]
+pub(super) struct Rows {
+    edges: [[[f32; WIDTH]; 3]; 3],
+    face: [[f32; WIDTH]; 3],
+    volume: [f32; WIDTH],
+    doubtful: u32,
+    edge_tolerance: f32,
+    face_tolerance: f32,
+}
+
+/// Of 16 rays, the ones that surely miss a triangle and those that surely cross it; f64 decides the rest.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Decided {
+    pub(super) miss: u32,
+    pub(super) hit: u32,
+}
+
+impl Rows {
+    /// The triangle in `lane` against 16 rays along `d`.
+    #[inline(always)]
+    pub(super) fn test<I: Isa>(&self, lane: usize, d: &[I::Sixteen; 3]) -> Decided {
+        if self.doubtful >> lane & 1 == 1 {
+            return Decided { miss: 0, hit: 0 };
+        }
+        let along = |n: &[[f32; WIDTH]; 3]| {
+            let [x, y, z] = [n[0][lane], n[1][lane], n[2][lane]];
+            let partial = d[2].mul(I::Sixteen::splat(z));
+            d[0].mul_add(I::Sixteen::splat(x), d[1].mul_add(I::Sixteen::splat(y), partial))
+        };
+        let inside = along(&self.edges[0]).min(along(&self.edges[1])).min(along(&self.edges[2]));
+        let beyond = along(&self.face).sub(I::Sixteen::splat(self.volume[lane]));
+        let (edge, face) = (self.edge_tolerance, self.face_tolerance);
+        let miss = inside.less(I::Sixteen::splat(-edge)) | beyond.less(I::Sixteen::splat(-face));
+        let hit = I::Sixteen::splat(edge).less(inside) & I::Sixteen::splat(face).less(beyond);
+        Decided { miss, hit }
+    }
+}
+
+#[inline(always)]
+fn load<I: Isa>(rows: &[[f32; WIDTH]; 3]) -> [I::Eight; 3] {
+    [I::Eight::load(&rows[0]), I::Eight::load(&rows[1]), I::Eight::load(&rows[2])]
+}
+
+#[inline(always)]
+fn splat<I: Isa>(v: [f32; 3]) -> [I::Eight; 3] {
+    [I::Eight::splat(v[0]), I::Eight::splat(v[1]), I::Eight::splat(v[2])]
+}
+
+#[inline(always)]
+fn add<I: Isa>(a: [I::Eight; 3], b: [I::Eight; 3]) -> [I::Eight; 3] {
+    [a[0].add(b[0]), a[1].add(b[1]), a[2].add(b[2])]
+}
+
+#[inline(always)]
+fn sub<I: Isa>(a: [I::Eight; 3], b: [I::Eight; 3]) -> [I::Eight; 3] {
+    [a[0].sub(b[0]), a[1].sub(b[1]), a[2].sub(b[2])]
+}
+
+#[inline(always)]
+fn abs<I: Isa>(a: [I::Eight; 3]) -> [I::Eight; 3] {
+    [a[0].abs(), a[1].abs(), a[2].abs()]
+}
+
+#[inline(always)]
+fn turn<I: Isa>(a: [I::Eight; 3], sign: I::Eight) -> [I::Eight; 3] {
+    [a[0].flip(sign), a[1].flip(sign), a[2].flip(sign)]
+}
+
+#[inline(always)]
+fn dot<I: Isa>(a: [I::Eight; 3], b: [I::Eight; 3]) -> I::Eight {
+    a[0].mul_add(b[0], a[1].mul_add(b[1], a[2].mul(b[2])))
+}
+
+#[inline(always)]
+fn cross<I: Isa>(a: [I::Eight; 3], b: [I::Eight; 3]) -> [I::Eight; 3] {
+    [
+        a[1].mul_sub(b[2], a[2].mul(b[1])),
+        a[2].mul_sub(b[0], a[0].mul(b[2])),
+        a[0].mul_sub(b[1], a[1].mul(b[0])),
+    ]
+}
