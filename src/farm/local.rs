@@ -6,8 +6,8 @@
 //! not grow with the picture, and histories in the groups that share paths: the points of all paths of a block and a group
 //! are sorted into tiles of neighbours, wherever they belong.
 
-use super::ordering::kd_order;
 use super::receivers::{ReceiverSet, Sensed};
+use crate::geometry::kd_order;
 use crate::photometry::Colour;
 use crate::random::Generator;
 use crate::scene::Scene;

@@ -6,7 +6,6 @@
 //! durable       replace a file so that a crash leaves the old or the new one
 //! folder        what lies where in the folder of a plan
 //! inputs        files -> plan, scene
-//! ordering      which bins share tiles
 //! receivers     bins of a job -> receivers in a scene
 //! regions       parts of maps, one number a batch
 //! pilot         the bound of the kernel, fixed before the run
@@ -26,7 +25,6 @@ pub mod folder;
 pub mod inputs;
 mod local;
 pub mod merge;
-mod ordering;
 pub mod pilot;
 pub mod plan;
 pub mod realization;

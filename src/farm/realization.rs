@@ -6,9 +6,9 @@
 //! Each receiver set keeps the order in which its bins share tiles, found once from the centres of its bins.
 
 use super::local;
-use super::ordering::kd_order;
 use super::receivers::{CentreSight, ReceiverSet};
 use super::regions::Regions;
+use crate::geometry::kd_order;
 use crate::job::{Channels, Estimator, Job, Sampling};
 use crate::random::sobol::PointSet;
 use crate::random::{Domain, Stream};
@@ -82,9 +82,8 @@ impl<'a> Realization<'a> {
         let sets = self.sets.par_iter().zip(&self.orders_of_bins);
         let channels = if self.job.run.channels == Channels::Rgb { 3 } else { 1 };
         let rule = (channels, &self.orders);
-        let score = |(set, order): (&ReceiverSet, &Vec<u32>)| {
-            local::score(set, self.scene, order, index, &histories, rule)
-        };
+        let score =
+            |(set, order): (&ReceiverSet, &Vec<u32>)| local::score(set, self.scene, order, index, &histories, rule);
         (sets.map(score).collect(), flux)
     }
 

@@ -130,9 +130,8 @@ impl Collapse<'_> {
         let mut children = vec![binary];
         while children.len() < WIDTH {
             let area = |i: &usize| self.from.nodes[children[*i]].aabb.half_area();
-            let widest = (0..children.len())
-                .filter(|&i| !self.is_block(children[i]))
-                .max_by(|a, b| area(a).total_cmp(&area(b)));
+            let widest =
+                (0..children.len()).filter(|&i| !self.is_block(children[i])).max_by(|a, b| area(a).total_cmp(&area(b)));
             let Some(widest) = widest else { break };
             let first = self.from.nodes[children[widest]].first_index as usize;
             children[widest] = first;

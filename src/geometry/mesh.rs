@@ -6,7 +6,7 @@
 //! edge meets both. Everything before that, in f32 and for many triangles at once, is conservative.
 
 use super::bvh::{Bvh8, Node, WIDTH};
-use super::planes::{Block, Directions, Extent, Planes};
+use super::planes::{Block, Directions, Extent, Planes, splat};
 use super::simd::{Isa, Kernel, Path, Vector};
 use super::{Hit, Ray, hit};
 use crate::math::{DVec3, Vec3};
@@ -156,8 +156,7 @@ struct BoxRay<I: Isa> {
 impl<I: Isa> BoxRay<I> {
     #[inline(always)]
     fn new(origin: Vec3, direction: Vec3) -> Self {
-        let splat = |v: Vec3| [I::Eight::splat(v.x), I::Eight::splat(v.y), I::Eight::splat(v.z)];
-        BoxRay { origin: splat(origin), inverse: splat(1.0 / direction) }
+        BoxRay { origin: splat::<I>(origin.to_array()), inverse: splat::<I>((1.0 / direction).to_array()) }
     }
 
     /// The boxes of `node` that the ray meets before `end`, and when.
@@ -180,8 +179,7 @@ impl<I: Isa> BoxRay<I> {
 #[inline(always)]
 fn candidates<I: Isa>(mesh: &Mesh, node: &Node, slot: usize, origin: Vec3, direction: Vec3) -> (usize, u32) {
     let (apex, d) = (origin.to_array(), direction.to_array());
-    let side = |sides: &[[f32; WIDTH]; 3]| [sides[0][slot], sides[1][slot], sides[2][slot]];
-    let extent = Extent::new(apex, side(&node.low), side(&node.high));
+    let extent = Extent::new(apex, node, slot);
     let number = node.child[slot];
     let block = &mesh.blocks[number as usize];
     let planes = Planes::<I>::new(block, apex, extent, &Directions::new(d, d), mesh.floor);

@@ -11,6 +11,7 @@
 
 mod bvh;
 mod mesh;
+mod ordering;
 mod plane;
 mod planes;
 mod proximity;
@@ -20,6 +21,7 @@ mod sphere;
 pub mod visibility;
 
 pub use mesh::Mesh;
+pub use ordering::kd_order;
 pub use plane::Plane;
 pub use sphere::Sphere;
 

@@ -24,7 +24,7 @@
 //! A lifted point lies 16 u (max |p| + D) off its own surface, D the diagonal of the geometry: more than 10.2 u D, so the
 //! surface that a receiver stands on never needs f64.
 
-use super::bvh::WIDTH;
+use super::bvh::{Node, WIDTH};
 use super::simd::{Isa, Vector};
 use crate::math::Vec3;
 
@@ -110,14 +110,15 @@ pub(super) struct Extent {
 }
 
 impl Extent {
-    /// Of a block in the box from `low` to `high`.
+    /// Of the block in box `slot` of `node`.
     #[inline(always)]
-    pub(super) fn new(apex: [f32; 3], low: [f32; 3], high: [f32; 3]) -> Self {
+    pub(super) fn new(apex: [f32; 3], node: &Node, slot: usize) -> Self {
         let (mut size, mut edge, mut squares) = (0.0f32, 0.0f32, 0.0f32);
         for axis in 0..3 {
-            let far = (low[axis] - apex[axis]).abs().max((high[axis] - apex[axis]).abs());
+            let (low, high) = (node.low[axis][slot], node.high[axis][slot]);
+            let far = (low - apex[axis]).abs().max((high - apex[axis]).abs());
             size = size.max(far);
-            edge = edge.max(high[axis] - low[axis]);
+            edge = edge.max(high - low);
             squares += far * far;
         }
         Extent { far: squares.sqrt(), size, edge }
@@ -150,8 +151,8 @@ impl<I: Isa> Planes<I> {
     /// coordinates \[m\].
     #[inline(always)]
     pub(super) fn new(block: &Block, apex: [f32; 3], extent: Extent, directions: &Directions, floor: f32) -> Self {
-        let corner = |k: usize| -> [I::Eight; 3] { load::<I>(&block.corners[k]) };
-        let (a, b, c) = (corner(0), corner(1), corner(2));
+        let [a, b, c] = &block.corners;
+        let (a, b, c) = (load::<I>(a), load::<I>(b), load::<I>(c));
         let o = [I::Eight::splat(apex[0]), I::Eight::splat(apex[1]), I::Eight::splat(apex[2])];
         let (x, y, z) = (sub::<I>(a, o), sub::<I>(b, o), sub::<I>(c, o));
         let edges = [
@@ -208,10 +209,12 @@ impl<I: Isa> Planes<I> {
     /// To memory, from where single triangles are taken.
     #[inline(always)]
     pub(super) fn store(&self, rows: &mut Rows) {
-        for (edge, row) in self.edges.iter().zip(&mut rows.edges) {
-            edge.iter().zip(row).for_each(|(e, row)| e.store(row));
+        for axis in 0..3 {
+            for edge in 0..3 {
+                self.edges[edge][axis].store(&mut rows.edges[edge][axis]);
+            }
+            self.face[axis].store(&mut rows.face[axis]);
         }
-        self.face.iter().zip(&mut rows.face).for_each(|(f, row)| f.store(row));
         self.volume.store(&mut rows.volume);
         (rows.edge_tolerance, rows.face_tolerance) = (self.edge_tolerance, self.face_tolerance);
         rows.doubtful = self.doubtful;
@@ -243,13 +246,9 @@ impl Rows {
         if self.doubtful >> lane & 1 == 1 {
             return Decided { miss: 0, hit: 0 };
         }
-        let along = |n: &[[f32; WIDTH]; 3]| {
-            let [x, y, z] = [n[0][lane], n[1][lane], n[2][lane]];
-            let partial = d[2].mul(I::Sixteen::splat(z));
-            d[0].mul_add(I::Sixteen::splat(x), d[1].mul_add(I::Sixteen::splat(y), partial))
-        };
-        let inside = along(&self.edges[0]).min(along(&self.edges[1])).min(along(&self.edges[2]));
-        let beyond = along(&self.face).sub(I::Sixteen::splat(self.volume[lane]));
+        let [first, second, third] = &self.edges;
+        let inside = along::<I>(first, lane, d).min(along::<I>(second, lane, d)).min(along::<I>(third, lane, d));
+        let beyond = along::<I>(&self.face, lane, d).sub(I::Sixteen::splat(self.volume[lane]));
         let (edge, face) = (self.edge_tolerance, self.face_tolerance);
         let miss = inside.less(I::Sixteen::splat(-edge)) | beyond.less(I::Sixteen::splat(-face));
         let hit = I::Sixteen::splat(edge).less(inside) & I::Sixteen::splat(face).less(beyond);
@@ -257,13 +256,22 @@ impl Rows {
     }
 }
 
+/// The scalar products of one normal with 16 directions.
+#[inline(always)]
+fn along<I: Isa>(normals: &[[f32; WIDTH]; 3], lane: usize, d: &[I::Sixteen; 3]) -> I::Sixteen {
+    let z = d[2].mul(I::Sixteen::splat(normals[2][lane]));
+    let yz = d[1].mul_add(I::Sixteen::splat(normals[1][lane]), z);
+    d[0].mul_add(I::Sixteen::splat(normals[0][lane]), yz)
+}
+
 #[inline(always)]
 fn load<I: Isa>(rows: &[[f32; WIDTH]; 3]) -> [I::Eight; 3] {
     [I::Eight::load(&rows[0]), I::Eight::load(&rows[1]), I::Eight::load(&rows[2])]
 }
 
+/// The same vector in all lanes.
 #[inline(always)]
-fn splat<I: Isa>(v: [f32; 3]) -> [I::Eight; 3] {
+pub(super) fn splat<I: Isa>(v: [f32; 3]) -> [I::Eight; 3] {
     [I::Eight::splat(v[0]), I::Eight::splat(v[1]), I::Eight::splat(v[2])]
 }
 
@@ -294,9 +302,5 @@ fn dot<I: Isa>(a: [I::Eight; 3], b: [I::Eight; 3]) -> I::Eight {
 
 #[inline(always)]
 fn cross<I: Isa>(a: [I::Eight; 3], b: [I::Eight; 3]) -> [I::Eight; 3] {
-    [
-        a[1].mul_sub(b[2], a[2].mul(b[1])),
-        a[2].mul_sub(b[0], a[0].mul(b[2])),
-        a[0].mul_sub(b[1], a[1].mul(b[0])),
-    ]
+    [a[1].mul_sub(b[2], a[2].mul(b[1])), a[2].mul_sub(b[0], a[0].mul(b[2])), a[0].mul_sub(b[1], a[1].mul(b[0]))]
 }

@@ -69,7 +69,8 @@ impl Mesh {
         }
         let (low, high) = half_ball(position + 0.5 * floor * normal, normal, reach + floor);
         let exceeds = |block: u32| {
-            let corners = self.triangles[self.bvh.block(block)].iter().map(|t| t.corners.map(|c| c.as_dvec3() - position));
+            let corners =
+                self.triangles[self.bvh.block(block)].iter().map(|t| t.corners.map(|c| c.as_dvec3() - position));
             corners.into_iter().any(|c| greatest_factor(&c, normal, floor) > bound)
         };
         self.bvh.blocks_in(low, high).any(exceeds)

@@ -53,14 +53,20 @@ impl Shaft {
             let apex = I::Eight::splat(self.apex[axis]);
             let low = I::Eight::load(&node.low[axis]).sub(apex);
             let high = I::Eight::load(&node.high[axis]).sub(apex);
-            let factor = |side: &[[f32; 3]; 2], k: usize| I::Eight::splat(side[k][axis]);
-            enter = enter.max(low.mul(factor(&self.enter, 0)).max(high.mul(factor(&self.enter, 1))));
-            let last = high.mul_add(factor(&self.leave, 0), factor(&self.stay, 0));
-            leave = leave.min(last.min(low.mul_add(factor(&self.leave, 1), factor(&self.stay, 1))));
+            let [enter_low, enter_high] = lanes::<I>(&self.enter, axis);
+            let [leave_high, leave_low] = lanes::<I>(&self.leave, axis);
+            let [stay_high, stay_low] = lanes::<I>(&self.stay, axis);
+            enter = enter.max(low.mul(enter_low).max(high.mul(enter_high)));
+            leave = leave.min(high.mul_add(leave_high, stay_high).min(low.mul_add(leave_low, stay_low)));
         }
         let miss = leave.less(enter.mul(I::Eight::splat(EARLIER)));
         !miss & node.boxes
     }
+}
+
+#[inline(always)]
+fn lanes<I: Isa>(sides: &[[f32; 3]; 2], axis: usize) -> [I::Eight; 2] {
+    [I::Eight::splat(sides[0][axis]), I::Eight::splat(sides[1][axis])]
 }
 
 /// Sixteen segments from an apex, against one box at a time.

@@ -112,8 +112,11 @@ impl Points {
     /// The segments from `apex` to the points of a bundle.
     #[inline(always)]
     fn segments<I: Isa>(&self, bundle: usize, apex: [f32; 3]) -> [I::Sixteen; 3] {
-        let along = |p: &[f32; BUNDLE], o: f32| I::Sixteen::load(p).sub(I::Sixteen::splat(o));
-        [along(&self.x[bundle], apex[0]), along(&self.y[bundle], apex[1]), along(&self.z[bundle], apex[2])]
+        [
+            I::Sixteen::load(&self.x[bundle]).sub(I::Sixteen::splat(apex[0])),
+            I::Sixteen::load(&self.y[bundle]).sub(I::Sixteen::splat(apex[1])),
+            I::Sixteen::load(&self.z[bundle]).sub(I::Sixteen::splat(apex[2])),
+        ]
     }
 }
 
@@ -392,8 +395,7 @@ impl Descent<'_> {
 
     #[inline(always)]
     fn planes<I: Isa>(&self, node: &Node, slot: usize, shaft: &Shaft) -> Planes<I> {
-        let side = |sides: &[[f32; 8]; 3]| [sides[0][slot], sides[1][slot], sides[2][slot]];
-        let extent = Extent::new(self.apex, side(&node.low), side(&node.high));
+        let extent = Extent::new(self.apex, node, slot);
         let block = &self.mesh.blocks[node.child[slot] as usize];
         Planes::new(block, self.apex, extent, &shaft.directions, self.mesh.floor)
     }

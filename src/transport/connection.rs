@@ -282,6 +282,22 @@ fn luminance<const C: usize>(channels: [f64; C]) -> f64 {
     if C == 1 { channels[0] } else { colour(channels).luminance() }
 }
 
+#[inline(always)]
+fn splat<I: Isa>(v: Vec3) -> [I::Sixteen; 3] {
+    [I::Sixteen::splat(v.x), I::Sixteen::splat(v.y), I::Sixteen::splat(v.z)]
+}
+
+#[inline(always)]
+fn lanes<I: Isa>(columns: &[Column; 3], bundle: usize) -> [I::Sixteen; 3] {
+    let [x, y, z] = columns;
+    [I::Sixteen::load(&x[bundle]), I::Sixteen::load(&y[bundle]), I::Sixteen::load(&z[bundle])]
+}
+
+#[inline(always)]
+fn dot<I: Isa>(a: &[I::Sixteen; 3], b: &[I::Sixteen; 3]) -> I::Sixteen {
+    a[0].mul(b[0]).add(a[1].mul(b[1])).add(a[2].mul(b[2]))
+}
+
 /// At most [`TILE`] links as a structure of arrays.
 #[derive(Debug)]
 pub struct Tile {
@@ -358,19 +374,15 @@ impl Tile {
     /// Geometric factors G without visibility; 0 where vertex or receiver faces away, and not `seen` \[1/m2\].
     #[inline(always)]
     fn factors<I: Isa>(&self, vertex: &Connector, factors: &mut Column, seen: &mut Lanes) {
-        let splat = |v: Vec3| [I::Sixteen::splat(v.x), I::Sixteen::splat(v.y), I::Sixteen::splat(v.z)];
-        let (p, n) = (splat(vertex.position), splat(vertex.normal));
+        let (p, n) = (splat::<I>(vertex.position), splat::<I>(vertex.normal));
         let zero = I::Sixteen::splat(0.0);
         for bundle in 0..self.bundles().min(BUNDLES) {
-            let lanes = |columns: &[Column; 3], axis: usize| I::Sixteen::load(&columns[axis][bundle]);
-            let way = |axis: usize| lanes(&self.position, axis).sub(p[axis]);
-            let w = [way(0), way(1), way(2)];
-            let dot = |a: &[I::Sixteen; 3]| a[0].mul(w[0]).add(a[1].mul(w[1])).add(a[2].mul(w[2]));
-            let leaving = dot(&n).max(zero);
-            let normal = [lanes(&self.normal, 0), lanes(&self.normal, 1), lanes(&self.normal, 2)];
-            let arriving = zero.sub(dot(&normal)).max(zero);
+            let to = lanes::<I>(&self.position, bundle);
+            let w = [to[0].sub(p[0]), to[1].sub(p[1]), to[2].sub(p[2])];
+            let leaving = dot::<I>(&n, &w).max(zero);
+            let arriving = zero.sub(dot::<I>(&lanes::<I>(&self.normal, bundle), &w)).max(zero);
             // A receiver at the vertex itself has no direction and gets nothing, not NaN.
-            let inverse = I::Sixteen::splat(1.0).div(dot(&w).max(I::Sixteen::splat(1e-30)));
+            let inverse = I::Sixteen::splat(1.0).div(dot::<I>(&w, &w).max(I::Sixteen::splat(1e-30)));
             let factor = leaving.mul(inverse).mul(arriving.mul(inverse));
             factor.store(&mut factors[bundle]);
             seen[bundle] = zero.less(factor) as u16;

@@ -1,11 +1,11 @@
-//! The order in which bins share tiles: neighbours in space together, by median splits.
+//! The order in which points share tiles: neighbours in space together, by median splits.
 //!
 //! A tile whose receivers lie close together sees the same few occluders, which is what the visibility kernel
-//! lives on; so do the groups and bundles of points inside a tile. The order never changes a number: every bin sums for
-//! itself.
+//! lives on; so do the groups and bundles of points inside a tile. The order never changes a number: every point has
+//! sums of its own.
 
+use super::visibility::TILE;
 use crate::math::DVec3;
-use crate::transport::connection::TILE;
 
 /// Sizes of the runs that lie close together: a tile, a group, a bundle.
 const RUNS: [usize; 3] = [TILE, 64, 16];
