@@ -35,8 +35,9 @@ pub fn score(
 ) -> Scores {
     let rule = Rule { bound: set.bound(), channels, orders: orders.clone() };
     let mut scores = Scores::zero(set.shape());
+    let shared = set.lit_points(scene, batch);
     for bins in order.chunks(BLOCK) {
-        let block = Block { set, scene, histories, rule: &rule, bins, batch };
+        let block = Block { set, scene, histories, shared: &shared, rule: &rule, bins, batch };
         for (&bin, score) in bins.iter().zip(block.scores()) {
             score.write(bin, &set.shape().monitored, &mut scores);
         }
@@ -49,6 +50,8 @@ struct Block<'a> {
     set: &'a ReceiverSet,
     scene: &'a Scene,
     histories: &'a Connectors,
+    /// Points of emitters, for each position in a bin.
+    shared: &'a [Connectors],
     rule: &'a Rule,
     bins: &'a [u32],
     batch: u64,
@@ -63,8 +66,8 @@ struct Continued {
 
 impl Block<'_> {
     fn scores(&self) -> Vec<BinScore> {
-        let sensed: Vec<Sensed> =
-            self.bins.par_iter().map(|&bin| self.set.sense(self.scene, bin as usize, self.batch)).collect();
+        let sense = |bins: &[u32]| self.set.sense(self.scene, bins, self.batch, self.shared, self.rule.channels);
+        let sensed: Vec<Sensed> = self.bins.par_chunks(TILE).flat_map_iter(sense).collect();
         let mut scores: Vec<BinScore> = sensed.iter().zip(self.bins).map(|(s, &bin)| self.nothing(s, bin)).collect();
         let all = 0..self.histories.histories();
         self.connect(self.links(&sensed), 0, all, &mut scores);

@@ -18,7 +18,7 @@ use super::receiver::Receiver;
 use super::trajectory::Vertex;
 use crate::geometry::simd::{Isa, Kernel, Vector};
 use crate::geometry::visibility::{BUNDLE, BUNDLES, Lanes, Points, Scratch};
-use crate::math::{PI, Vec3};
+use crate::math::{DVec3, PI, Vec3};
 use crate::photometry::Colour;
 use crate::scene::Scene;
 use std::ops::Range;
@@ -39,6 +39,21 @@ struct Connector {
     after_delta: bool,
     /// The vertex itself where the law of reflection depends on direction.
     glossy: Option<Vertex>,
+    /// Number of the emitter of which this is a point and no vertex.
+    emitter: Option<u32>,
+}
+
+/// A point of an emitter, as the start of light to many receivers.
+#[derive(Clone, Copy, Debug)]
+pub struct LitPoint {
+    /// Position \[m\].
+    pub position: DVec3,
+    /// Unit normal of the side that emits.
+    pub normal: DVec3,
+    /// Luminous intensity along the normal \[cd\].
+    pub intensity: Colour,
+    /// Number of the emitter.
+    pub emitter: u32,
 }
 
 /// The vertices of many histories, ready to be connected.
@@ -56,6 +71,21 @@ impl Connectors {
     pub fn push(&mut self, scene: &Scene, history: &[Vertex]) {
         self.all.extend(history.iter().map(|v| connector(scene, v)));
         self.mirrored |= history.iter().any(|v| v.after_delta);
+        self.ends.push(self.all.len());
+    }
+
+    /// Appends points of emitters in the place of the vertices of a history; no reflection counts.
+    pub fn push_lit(&mut self, scene: &Scene, points: &[LitPoint]) {
+        self.all.extend(points.iter().map(|p| Connector {
+            position: p.position.as_vec3(),
+            lifted: scene.geometry.lift(p.position, p.normal).as_vec3(),
+            normal: p.normal.as_vec3(),
+            intensity: p.intensity.0.map(|c| c as f32),
+            order: 0,
+            after_delta: false,
+            glossy: None,
+            emitter: Some(p.emitter),
+        }));
         self.ends.push(self.all.len());
     }
 
@@ -85,6 +115,7 @@ fn connector(scene: &Scene, v: &Vertex) -> Connector {
         order: v.order,
         after_delta: v.after_delta,
         glossy: lambert.is_none().then_some(*v),
+        emitter: None,
     }
 }
 
@@ -310,6 +341,8 @@ pub struct Tile {
     /// Response of each receiver where it does not depend on direction.
     constant: Vec<Option<Colour>>,
     all_constant: bool,
+    /// Receivers that take no light from the shared points of an emitter.
+    refused: Vec<(u32, Lanes)>,
 }
 
 impl Tile {
@@ -332,7 +365,22 @@ impl Tile {
             all_constant: constant.iter().all(Option::is_some),
             constant,
             links,
+            refused: Vec::new(),
         }
+    }
+
+    /// The same tile without the light of the shared points of emitters at some of its receivers: entry by entry the number of
+    /// an emitter, and for each receiver whether it refuses.
+    pub fn refusing(mut self, refused: impl Iterator<Item = (u32, Vec<bool>)>) -> Self {
+        let lanes = |all: Vec<bool>| {
+            let mut lanes: Lanes = [0; BUNDLES];
+            for (i, refused) in all.into_iter().enumerate() {
+                lanes[i / BUNDLE] |= u16::from(refused) << (i % BUNDLE);
+            }
+            lanes
+        };
+        self.refused = refused.map(|(emitter, all)| (emitter, lanes(all))).collect();
+        self
     }
 
     /// The links, in the order in which they were given.
@@ -358,10 +406,13 @@ impl Tile {
         let mut factors: Column = [[0.0; BUNDLE]; BUNDLES];
         let mut seen: Lanes = [0; BUNDLES];
         self.factors::<I>(vertex, &mut factors, &mut seen);
+        for (_, refused) in self.refused.iter().filter(|(emitter, _)| Some(*emitter) == vertex.emitter) {
+            seen.iter_mut().zip(refused).for_each(|(seen, refused)| *seen &= !refused);
+        }
         if seen == [0; BUNDLES] {
             return;
         }
-        scene.geometry.shadow::<I>(vertex.lifted, &self.lifted, &mut seen, scratch);
+        scene.geometry.hide(vertex.lifted, &self.lifted, &mut seen, scratch);
         // No continuation finds what came from a delta scatterer: all of it is connected.
         let bound = if vertex.after_delta { f32::INFINITY } else { bound };
         self.spread::<I, C>(scene, vertex, &factors, &seen, bound, &mut sums.light);

@@ -45,5 +45,6 @@ pub mod direct;
 pub mod eye;
 pub mod receiver;
 pub mod reverse;
+pub mod shared;
 mod spherical_triangle;
 pub mod trajectory;

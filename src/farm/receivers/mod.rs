@@ -5,20 +5,23 @@
 //! without extent is computed once. How histories are turned into scores is in [`super::local`].
 
 mod horizon;
+mod sense;
 mod sight;
 
+pub use sense::Sensed;
 pub use sight::CentreSight;
 
 mod crossing;
 mod reverse;
 
 use crate::error::{Error, Result};
+use crate::geometry::Ray;
 use crate::job::{Camera, Grid, Job, Point, SetShape};
 use crate::math::{DVec2, DVec3};
 use crate::photometry::Colour;
 use crate::random::{Domain, Generator, Stream};
 use crate::scene::Scene;
-use crate::transport::direct::{emitter_samples, from_emitters, from_lights};
+use crate::transport::direct::from_lights;
 use crate::transport::eye::{Eye, Gaze, latitude};
 use crate::transport::receiver::{Receiver, Response, Seen, look, look_at};
 use horizon::Sight;
@@ -28,6 +31,8 @@ pub struct ReceiverSet {
     shape: SetShape,
     bins: Bins,
     stream: Stream,
+    /// Of the points of emitters that receivers share.
+    emitters: Stream,
     /// Of the receiver-side continuations.
     continuations: Stream,
     histories: u64,
@@ -47,16 +52,6 @@ enum Bins {
 
 /// Draws after which a bin across the horizon is taken to show nothing of what lies above.
 const DRAWS: u32 = 1 << 16;
-
-/// What the positions of one bin say in one batch.
-pub struct Sensed {
-    /// Emission and sampled direct light \[lx or cd/m2\].
-    pub direct: Colour,
-    /// Where the histories are connected to.
-    pub receiver: Option<Receiver>,
-    /// Whether a surface that reflects was there.
-    pub existed: bool,
-}
 
 impl ReceiverSet {
     /// All receiver sets of `job` in the order of [`Job::sets`], regions left out; the job has passed
@@ -86,9 +81,10 @@ impl ReceiverSet {
 
     fn new(job: &Job, shape: SetShape, bins: Bins, bound: f64) -> Self {
         let stream = Stream::new(job.run.seed, Domain::Receiver, &shape.name);
+        let emitters = Stream::new(job.run.seed, Domain::Emitter, &shape.name);
         let continuations = Stream::new(job.run.seed, Domain::Continuation, &shape.name);
         let histories = job.run.histories_per_batch;
-        let mut set = ReceiverSet { shape, bins, stream, continuations, histories, bound, sights: Vec::new() };
+        let mut set = ReceiverSet { shape, bins, stream, emitters, continuations, histories, bound, sights: Vec::new() };
         if let Bins::Film { eye: eye @ Eye::Surface { point }, .. } = &set.bins {
             set.sights = (0..set.shape.bins()).map(|i| set.sight(eye, point.normal, i)).collect();
         }
@@ -190,7 +186,8 @@ impl ReceiverSet {
     }
 
     /// A film position of bin `bin`: in its stratum, or across the horizon anywhere in the bin, but above.
-    fn draw(&self, eye: &Eye, strata: u32, stratum: u32, bin: usize, rng: &mut Generator) -> DVec2 {
+    fn draw(&self, eye: &Eye, stratum: u32, bin: usize, rng: &mut Generator) -> DVec2 {
+        let strata = self.positions().isqrt();
         if self.sights.get(bin) != Some(&Sight::Across) {
             return self.film(bin, strata, stratum, rng.uniform2());
         }
@@ -211,47 +208,18 @@ impl ReceiverSet {
             Bins::Film { eye, strata } => {
                 let mut rng = self.stream.generator(bin as u64);
                 let stratum = rng.below(strata * strata);
-                let film = self.draw(eye, *strata, stratum, bin, &mut rng);
+                let film = self.draw(eye, stratum, bin, &mut rng);
                 gaze(scene, eye, film, &mut rng).receiver
             }
         }
     }
+}
 
-    /// Direct light and receiver of one bin in one batch.
-    pub fn sense(&self, scene: &Scene, bin: usize, batch: u64) -> Sensed {
-        let mut rng = self.stream.generator(batch * self.shape.bins() as u64 + bin as u64);
-        match &self.bins {
-            Bins::Meters(meters) => self.sense_meter(scene, meters[bin].as_ref(), &mut rng),
-            Bins::Film { eye, strata } => self.sense_film(scene, eye, *strata, bin, &mut rng),
-        }
-    }
-
-    fn sense_meter(&self, scene: &Scene, meter: Option<&Receiver>, rng: &mut Generator) -> Sensed {
-        let samples = emitter_samples(self.histories);
-        let direct = meter.map_or(Colour::BLACK, |r| from_emitters(scene, r, samples, rng));
-        // In a scene without reflection there is nothing to wait for beyond direct light.
-        Sensed { direct, receiver: meter.copied(), existed: meter.is_some() && scene.reflects() }
-    }
-
-    fn sense_film(&self, scene: &Scene, eye: &Eye, strata: u32, bin: usize, rng: &mut Generator) -> Sensed {
-        let positions = strata * strata;
-        let samples = emitter_samples(self.histories).div_ceil(u64::from(positions));
-        let carrying = rng.below(positions);
-        let mut sensed = Sensed { direct: Colour::BLACK, receiver: None, existed: false };
-        for stratum in 0..positions {
-            let film = self.draw(eye, strata, stratum, bin, rng);
-            let seen = gaze(scene, eye, film, rng);
-            sensed.direct += seen.emitted;
-            if let Some(receiver) = &seen.receiver {
-                sensed.direct += from_lights(scene, receiver) + from_emitters(scene, receiver, samples, rng);
-                sensed.existed = true;
-            }
-            if stratum == carrying {
-                sensed.receiver = seen.receiver;
-            }
-        }
-        sensed.direct = sensed.direct / f64::from(positions);
-        sensed
+/// The ray to follow, where there is one.
+fn gaze_ray(gaze: &Gaze) -> Option<Ray> {
+    match gaze {
+        Gaze::Along(ray) => Some(*ray),
+        Gaze::At(..) | Gaze::Nowhere => None,
     }
 }
 
