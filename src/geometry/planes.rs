@@ -98,6 +98,16 @@ impl Directions {
     }
 }
 
+impl Directions {
+    /// From `apex` to the points of the box from `low` to `high`.
+    #[inline(always)]
+    pub(super) fn between(apex: [f32; 3], low: [f32; 3], high: [f32; 3]) -> Self {
+        // Rounding is monotonic: every d of the bundle, rounded in the same way, lies between these.
+        let [least, most] = [low, high].map(|p| [p[0] - apex[0], p[1] - apex[1], p[2] - apex[2]]);
+        Directions::new(least, most)
+    }
+}
+
 /// How large the corners of a block are, seen from the apex.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Extent {
@@ -240,6 +250,20 @@ pub(super) struct Decided {
 }
 
 impl Rows {
+    /// The planes again, with the tolerances of the directions that they were made for.
+    #[inline(always)]
+    pub(super) fn planes<I: Isa>(&self) -> Planes<I> {
+        let [first, second, third] = &self.edges;
+        Planes {
+            edges: [load::<I>(first), load::<I>(second), load::<I>(third)],
+            face: load::<I>(&self.face),
+            volume: I::Eight::load(&self.volume),
+            doubtful: self.doubtful,
+            edge_tolerance: self.edge_tolerance,
+            face_tolerance: self.face_tolerance,
+        }
+    }
+
     /// The triangle in `lane` against 16 rays along `d`.
     #[inline(always)]
     pub(super) fn test<I: Isa>(&self, lane: usize, d: &[I::Sixteen; 3]) -> Decided {

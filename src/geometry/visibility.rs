@@ -18,7 +18,7 @@
 
 use super::bvh::Node;
 use super::mesh::{Mesh, bits};
-use super::planes::{Extent, Planes, Rows};
+use super::planes::{Directions, Extent, Planes, Rows};
 use super::shaft::{Bundle, Shaft};
 use super::simd::{Isa, Vector};
 use super::{Geometry, Sphere};
@@ -201,7 +201,7 @@ type Candidates = ArrayVec<(u32, u32), CANDIDATES>;
 /// Memory that a kernel works in: made once for many calls.
 #[derive(Default)]
 pub struct Scratch {
-    rows: Rows,
+    few: [Rows; FEW as usize],
 }
 
 /// One apex on its way through the hierarchy.
@@ -275,59 +275,68 @@ impl Descent<'_> {
         if blocks == 0 {
             return None;
         }
-        if blocks <= FEW { self.test_few::<I>(left, &shaft, first, seen) } else { Some(left) }
+        if blocks > FEW {
+            return Some(left);
+        }
+        self.test_few::<I>(&left, &shaft, first, seen);
+        None
     }
 
-    /// Tests the triangles of a few blocks for a whole tile or group; what is left of them.
+    /// Tests the triangles of a few blocks for a whole tile or group: their planes are set up once, and asked of each group before
+    /// each bundle.
     #[inline(always)]
-    fn test_few<I: Isa>(
-        &mut self,
-        mut few: Candidates,
-        shaft: &Shaft,
-        first: usize,
-        seen: &mut [u16],
-    ) -> Option<Candidates> {
-        let mut undecided = false;
-        for k in 0..few.len() {
-            let (number, boxes) = few[k];
+    fn test_few<I: Isa>(&mut self, few: &Candidates, shaft: &Shaft, first: usize, seen: &mut [u16]) {
+        let mut asked: ArrayVec<(u32, u32), { FEW as usize }> = ArrayVec::new();
+        for &(number, boxes) in few {
             let node = &self.mesh.bvh.nodes[number as usize];
             for slot in bits(boxes) {
                 let planes = self.planes::<I>(node, slot, shaft);
                 let against = planes.against(&shaft.directions);
                 let there = (1u32 << node.triangles[slot]) - 1;
                 if against.cover & there != 0 {
-                    seen.fill(0);
-                    return None;
+                    return seen.fill(0);
                 }
-                let may = against.may & there;
-                if may.count_ones() > 2 {
-                    undecided = true;
-                    continue;
-                }
-                few[k].1 &= !(1 << slot);
-                if may != 0 && self.test_all::<I>(&planes, node.child[slot], may, first, seen) {
-                    return None;
+                if against.may & there != 0 {
+                    planes.store(&mut self.scratch.few[asked.len()]);
+                    asked.push((node.child[slot], against.may & there));
                 }
             }
         }
-        undecided.then_some(few)
+        if !asked.is_empty() {
+            for (group, seen) in seen.chunks_mut(GROUP).enumerate() {
+                self.test_group::<I>(&asked, first + group * GROUP, seen);
+            }
+        }
     }
 
-    /// Tests the triangles `may` of a block against the bundles from `first` on; true when no point is left.
+    /// Tests the triangles of the blocks `asked`, whose planes are in the scratch, against the group of bundles from `first` on.
     #[inline(always)]
-    fn test_all<I: Isa>(&mut self, planes: &Planes<I>, block: u32, may: u32, first: usize, seen: &mut [u16]) -> bool {
-        planes.store(&mut self.scratch.rows);
-        let mut left = 0;
-        for (k, seen) in seen.iter_mut().enumerate() {
-            if *seen != 0 {
-                let d = self.points.segments::<I>(first + k, self.apex);
-                for lane in bits(may) {
-                    *seen = self.test_triangle::<I>(block, lane, first + k, &d, *seen);
+    fn test_group<I: Isa>(&mut self, asked: &[(u32, u32)], first: usize, seen: &mut [u16]) {
+        if seen.iter().all(|&lanes| lanes == 0) {
+            return;
+        }
+        let (low, high) = self.points.groups[first / GROUP];
+        let directions = Directions::between(self.apex, low, high);
+        let mut may: [u32; FEW as usize] = [0; FEW as usize];
+        for (k, &(_, triangles)) in asked.iter().enumerate() {
+            let against = self.scratch.few[k].planes::<I>().against(&directions);
+            if against.cover & triangles != 0 {
+                return seen.fill(0);
+            }
+            may[k] = against.may & triangles;
+        }
+        if may.iter().all(|&triangles| triangles == 0) {
+            return;
+        }
+        for (k, seen) in seen.iter_mut().enumerate().filter(|(_, seen)| **seen != 0) {
+            let d = self.points.segments::<I>(first + k, self.apex);
+            for (place, &(block, _)) in asked.iter().enumerate() {
+                for lane in bits(may[place]) {
+                    let rows = &self.scratch.few[place];
+                    *seen = self.test_triangle::<I>(rows, block, lane, first + k, &d, *seen);
                 }
-                left |= *seen;
             }
         }
-        left == 0
     }
 
     /// The points of `seen` in a bundle that none of the candidates blocks.
@@ -382,10 +391,10 @@ impl Descent<'_> {
         if may == 0 {
             return seen;
         }
-        planes.store(&mut self.scratch.rows);
+        planes.store(&mut self.scratch.few[0]);
         let mut seen = seen;
         for lane in bits(may) {
-            seen = self.test_triangle::<I>(node.child[slot], lane, bundle, d, seen);
+            seen = self.test_triangle::<I>(&self.scratch.few[0], node.child[slot], lane, bundle, d, seen);
             if seen == 0 {
                 break;
             }
@@ -402,8 +411,16 @@ impl Descent<'_> {
 
     /// The points of `seen` that one triangle does not block.
     #[inline(always)]
-    fn test_triangle<I: Isa>(&self, block: u32, lane: usize, bundle: usize, d: &[I::Sixteen; 3], seen: u16) -> u16 {
-        let decided = self.scratch.rows.test::<I>(lane, d);
+    fn test_triangle<I: Isa>(
+        &self,
+        rows: &Rows,
+        block: u32,
+        lane: usize,
+        bundle: usize,
+        d: &[I::Sixteen; 3],
+        seen: u16,
+    ) -> u16 {
+        let decided = rows.test::<I>(lane, d);
         let seen = seen & !(decided.hit as u16);
         let undecided = seen & !(decided.miss as u16);
         if undecided == 0 { seen } else { self.ask_f64(block, lane, bundle, undecided, seen) }
