@@ -37,7 +37,9 @@ fn main() {
             _ => jobs.push(argument),
         }
     }
-    println!("| job | histories, batches | us a history and bin | error | worst bin | FOM [1/s] |\n|---|---|---|---|---|---|");
+    println!(
+        "| job | histories, batches | us a history and bin | error | worst bin | FOM [1/s] |\n|---|---|---|---|---|---|"
+    );
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread");
     pool.install(|| jobs.iter().for_each(|path| measure(Path::new(path), &asked)));
 }
@@ -52,7 +54,8 @@ fn measure(path: &Path, asked: &Asked) {
     }
     let scene = job.scene.as_ref().expect("a scene in glTF");
     let bytes = std::fs::read(path.with_file_name(scene)).expect("the scene is where the job says");
-    let model = gltf::load("scene", &bytes, &mut |uri| panic!("{uri}: the scene is one file")).expect("the scene is right");
+    let model =
+        gltf::load("scene", &bytes, &mut |uri| panic!("{uri}: the scene is one file")).expect("the scene is right");
     let runs: Vec<[f64; 4]> = (1..=SEEDS).map(|seed| run(&model, &mut job, seed)).collect();
     let of = |k: usize| median(runs.iter().map(|r| r[k]));
     println!(

@@ -70,7 +70,7 @@ fn bound_of_closed(scene: &Scene) -> f64 {
         area += side;
         reflecting += side * surface.reflectance.albedo(0.5).luminance();
     }
-    SCORE_OF_A_HISTORY * PI / (area * (1.0 - (reflecting / area).min(BRIGHTEST)))
+    crate::math::knob("C", 3.0) * PI / (area * (1.0 - (reflecting / area).min(BRIGHTEST)))
 }
 
 fn bound_of_set(job: &Job, scene: &Scene, set: &ReceiverSet) -> f64 {
@@ -95,7 +95,7 @@ fn bound_of_set(job: &Job, scene: &Scene, set: &ReceiverSet) -> f64 {
     let middle = found.len() / 2;
     let (_, illuminance, _) = found.select_nth_unstable_by(middle, f64::total_cmp);
     let flux = scene.sources.flux();
-    SCORE_OF_A_HISTORY * PI * *illuminance / (flux * leaving / arriving)
+    crate::math::knob("C", 3.0) * PI * *illuminance / (flux * leaving / arriving)
 }
 
 /// What a vertex reflects \[lm\].

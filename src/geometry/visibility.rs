@@ -39,7 +39,9 @@ const CANDIDATES: usize = 64;
 /// Nodes that the shaft of a tile or a group opens: beyond that its groups or bundles go on alone.
 const OPENED: usize = 4;
 /// Blocks whose triangles the shaft of a tile or a group tests at once, at most.
-const FEW: u32 = 4;
+const FEW: u32 = 12;
+/// Triangles that every bundle of a tile or a group is asked for, at most.
+const MANY: u32 = 12;
 
 /// For each bundle of a tile, a bit for each of its points.
 pub type Lanes = [u16; BUNDLES];
@@ -278,35 +280,44 @@ impl Descent<'_> {
         if blocks > FEW {
             return Some(left);
         }
-        self.test_few::<I>(&left, &shaft, first, seen);
-        None
+        self.test_few::<I>(&mut left, &shaft, first, seen).then_some(left)
     }
 
     /// Tests the triangles of a few blocks for a whole tile or group: their planes are set up once, and asked of each group before
-    /// each bundle.
+    /// each bundle. True where there are too many of them, and smaller shafts must go on with what is left of `few`.
     #[inline(always)]
-    fn test_few<I: Isa>(&mut self, few: &Candidates, shaft: &Shaft, first: usize, seen: &mut [u16]) {
+    fn test_few<I: Isa>(&mut self, few: &mut Candidates, shaft: &Shaft, first: usize, seen: &mut [u16]) -> bool {
         let mut asked: ArrayVec<(u32, u32), { FEW as usize }> = ArrayVec::new();
-        for &(number, boxes) in few {
-            let node = &self.mesh.bvh.nodes[number as usize];
-            for slot in bits(boxes) {
+        let mut triangles = 0;
+        for (number, boxes) in few.iter_mut() {
+            let node = &self.mesh.bvh.nodes[*number as usize];
+            for slot in bits(*boxes) {
                 let planes = self.planes::<I>(node, slot, shaft);
                 let against = planes.against(&shaft.directions);
                 let there = (1u32 << node.triangles[slot]) - 1;
                 if against.cover & there != 0 {
-                    return seen.fill(0);
+                    seen.fill(0);
+                    return false;
                 }
-                if against.may & there != 0 {
+                let may = against.may & there;
+                triangles += may.count_ones();
+                if may == 0 {
+                    *boxes &= !(1 << slot);
+                } else if triangles <= MANY {
                     planes.store(&mut self.scratch.few[asked.len()]);
-                    asked.push((node.child[slot], against.may & there));
+                    asked.push((node.child[slot], may));
                 }
             }
+        }
+        if triangles > MANY {
+            return true;
         }
         if !asked.is_empty() {
             for (group, seen) in seen.chunks_mut(GROUP).enumerate() {
                 self.test_group::<I>(&asked, first + group * GROUP, seen);
             }
         }
+        false
     }
 
     /// Tests the triangles of the blocks `asked`, whose planes are in the scratch, against the group of bundles from `first` on.

@@ -12,18 +12,19 @@
 use super::connection::{Connectors, Link, LitPoint, Rule, Tile, connect};
 use super::direct::{from_emitters, from_some_emitters};
 use super::receiver::Receiver;
-use crate::geometry::visibility::{BUNDLE, BUNDLES, Lanes, Points, Scratch};
 use crate::geometry::Ray;
+use crate::geometry::visibility::{BUNDLE, BUNDLES, Lanes, Points, Scratch};
 use crate::math::{DVec2, DVec3, Vec3};
 use crate::photometry::Colour;
 use crate::random::Generator;
 use crate::random::sobol::PointSet;
 use crate::scene::{Emitter, Light, Scene};
+use std::ops::Range;
 
 /// Nearer than this to the centre, in lengths of its longest edge, an emitter is sampled for each receiver alone.
 const NEAR: f64 = 1.0;
 /// Points whose light is summed in f32 before it goes into f64.
-const TOGETHER: usize = 16;
+pub const TOGETHER: usize = 16;
 
 /// `count` points of the emitters of `scene`, a power of two, to be shared by receivers.
 pub fn lit_points(scene: &Scene, set: &PointSet, count: u32) -> Connectors {
@@ -31,29 +32,55 @@ pub fn lit_points(scene: &Scene, set: &PointSet, count: u32) -> Connectors {
     if scene.sources.emitters.is_empty() {
         return connectors;
     }
-    let mut points = Vec::new();
-    for i in 0..count {
-        let [choice, x, y, ..] = set.point(i);
-        let (number, probability) = scene.sources.choose_number(choice);
-        let emitter = &scene.sources.emitters[number];
-        let position = emitter.point(DVec2::new(x, y));
-        let intensity = emitter.luminance * (emitter.area / (probability * f64::from(count)));
-        let lit = |normal: DVec3| LitPoint { position, normal, intensity, emitter: number as u32 };
-        points.push(lit(emitter.normal));
-        if emitter.double_sided {
-            points.push(lit(-emitter.normal));
-        }
+    for first in (0..count).step_by(TOGETHER) {
+        let run = first..(first + TOGETHER as u32).min(count);
+        let points: Vec<LitPoint> = run.flat_map(|i| lit_point(scene, set, i, count)).collect();
+        connectors.push_lit(scene, &points);
     }
-    points.chunks(TOGETHER).for_each(|points| connectors.push_lit(scene, points));
     connectors
 }
 
+/// Point number `i` of `count`, on both sides of an emitter that has two.
+fn lit_point(scene: &Scene, set: &PointSet, i: u32, count: u32) -> impl Iterator<Item = LitPoint> {
+    let [choice, x, y, ..] = set.point(i);
+    let (number, probability) = scene.sources.choose_number(choice);
+    let emitter = &scene.sources.emitters[number];
+    let position = emitter.point(DVec2::new(x, y));
+    let intensity = emitter.luminance * (emitter.area / (probability * f64::from(count)));
+    let lit = move |normal: DVec3| LitPoint { position, normal, intensity, emitter: number as u32 };
+    let sides = if emitter.double_sided { 2 } else { 1 };
+    [emitter.normal, -emitter.normal].into_iter().take(sides).map(lit)
+}
+
+/// Points of emitters that receivers share.
+#[derive(Clone, Debug)]
+pub struct Shared<'a> {
+    /// All points that were drawn together.
+    pub points: &'a Connectors,
+    /// Which runs of [`TOGETHER`] of them are used.
+    pub some: Range<usize>,
+    /// One over the share of them that is used.
+    pub weight: f64,
+}
+
+impl<'a> Shared<'a> {
+    /// All `points`.
+    pub fn all(points: &'a Connectors) -> Self {
+        Shared { points, some: 0..points.histories(), weight: 1.0 }
+    }
+
+    /// The run number `run`.
+    pub fn run(points: &'a Connectors, run: usize) -> Self {
+        Shared { points, some: run..run + 1, weight: points.histories() as f64 }
+    }
+}
+
 /// Direct light at `receivers`, at most a tile, each with its generator, times their responses \[lx or cd/m2\]: exact from lights
-/// without extent where `lights` asks for it, from emitters by the `shared` points, or by `samples` of its own.
+/// without extent where `lights` asks for it, from emitters by the shared points, or by `samples` of its own.
 pub fn direct_light(
     scene: &Scene,
     receivers: &mut [(Receiver, &mut Generator)],
-    shared: &Connectors,
+    Shared { points, some, weight }: Shared,
     samples: u64,
     (lights, channels): (bool, usize),
 ) -> Vec<Colour> {
@@ -66,13 +93,13 @@ pub fn direct_light(
     let tile = Tile::new(scene, places.iter().map(link).collect(), 0);
     let refused = near.iter().map(|(number, near)| (*number, near.clone()));
     let rule = Rule { bound: f64::INFINITY, channels, orders: 0..1 };
-    let connected = connect(scene, shared, 0..shared.histories(), &tile.refusing(refused), &rule);
+    let connected = connect(scene, points, some, &tile.refusing(refused), &rule);
     for (i, (receiver, rng)) in receivers.iter_mut().enumerate() {
         light[i] += if receiver.response.is_peaked() {
             from_emitters(scene, receiver, samples, rng)
         } else {
             let own: Vec<u32> = near.iter().filter(|(_, near)| near[i]).map(|(number, _)| *number).collect();
-            connected[i].sum + from_some_emitters(scene, receiver, &own, samples, rng)
+            connected[i].sum * weight + from_some_emitters(scene, receiver, &own, samples, rng)
         };
     }
     light

@@ -19,6 +19,7 @@ use crate::geometry::Ray;
 use crate::job::{Camera, Grid, Job, Point, SetShape};
 use crate::math::{DVec2, DVec3};
 use crate::photometry::Colour;
+use crate::random::sobol::PointSet;
 use crate::random::{Domain, Generator, Stream};
 use crate::scene::Scene;
 use crate::transport::direct::from_lights;
@@ -35,6 +36,8 @@ pub struct ReceiverSet {
     emitters: Stream,
     /// Of the receiver-side continuations.
     continuations: Stream,
+    /// Of the directions in which they start.
+    directions: Stream,
     histories: u64,
     /// b of the bounded kernel \[1/m2\]; infinite where nothing is bounded.
     bound: f64,
@@ -52,6 +55,25 @@ enum Bins {
 
 /// Draws after which a bin across the horizon is taken to show nothing of what lies above.
 const DRAWS: u32 = 1 << 16;
+
+/// Random numbers of the paths that continue one bin in one batch: where their number is a power of two, they start
+/// with the points of a scrambled quasi-random set, so that their directions do not leave a part of the hemisphere out.
+pub struct Paths {
+    rng: Generator,
+    points: Option<PointSet>,
+    next: u32,
+}
+
+impl Paths {
+    /// The numbers of the next path.
+    pub fn next(&mut self) -> &mut Generator {
+        if let Some(points) = &self.points {
+            self.rng = self.rng.clone().after(points.point(self.next));
+            self.next += 1;
+        }
+        &mut self.rng
+    }
+}
 
 impl ReceiverSet {
     /// All receiver sets of `job` in the order of [`Job::sets`], regions left out; the job has passed
@@ -83,8 +105,19 @@ impl ReceiverSet {
         let stream = Stream::new(job.run.seed, Domain::Receiver, &shape.name);
         let emitters = Stream::new(job.run.seed, Domain::Emitter, &shape.name);
         let continuations = Stream::new(job.run.seed, Domain::Continuation, &shape.name);
+        let directions = Stream::new(job.run.seed, Domain::Direction, &shape.name);
         let histories = job.run.histories_per_batch;
-        let mut set = ReceiverSet { shape, bins, stream, emitters, continuations, histories, bound, sights: Vec::new() };
+        let mut set = ReceiverSet {
+            shape,
+            bins,
+            stream,
+            emitters,
+            continuations,
+            directions,
+            histories,
+            bound,
+            sights: Vec::new(),
+        };
         if let Bins::Film { eye: eye @ Eye::Surface { point }, .. } = &set.bins {
             set.sights = (0..set.shape.bins()).map(|i| set.sight(eye, point.normal, i)).collect();
         }
@@ -101,9 +134,11 @@ impl ReceiverSet {
         self.bound
     }
 
-    /// The generator of the continuations of bin `bin` in a batch.
-    pub fn continuation(&self, bin: u32, batch: u64) -> Generator {
-        self.continuations.generator(batch * self.shape.bins() as u64 + u64::from(bin))
+    /// The paths that continue bin `bin` in a batch, `count` in number.
+    pub fn continuations(&self, bin: u32, batch: u64, count: usize) -> Paths {
+        let index = batch * self.shape.bins() as u64 + u64::from(bin);
+        let points = count.is_power_of_two().then(|| PointSet::new(&self.directions, index, count.ilog2()));
+        Paths { rng: self.continuations.generator(index), points, next: 0 }
     }
 
     /// Where the centre of bin `i` looks, for the order of the tiles alone; infinite where nothing is seen.

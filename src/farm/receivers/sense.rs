@@ -14,7 +14,7 @@ use crate::transport::connection::Connectors;
 use crate::transport::direct::emitter_samples;
 use crate::transport::eye::{Eye, Gaze};
 use crate::transport::receiver::{Receiver, Seen, look_at};
-use crate::transport::shared::{direct_light, lit_points};
+use crate::transport::shared::{Shared, TOGETHER, direct_light, lit_points};
 
 /// Points of emitters shared in a batch, over its histories: chosen by measured figure of merit (docs/benchmarks.md).
 const SHARED: u64 = 1;
@@ -39,9 +39,25 @@ impl ReceiverSet {
     /// The points of emitters that all receivers of the set share in `batch`, for each position in a bin.
     pub fn lit_points(&self, scene: &Scene, batch: u64) -> Vec<Connectors> {
         let positions = u64::from(self.positions());
-        let count = (self.histories * SHARED / positions).max(1).next_power_of_two() as u32;
-        let set = |position| PointSet::new(&self.emitters, batch * positions + position, count.ilog2());
-        (0..positions).map(|position| lit_points(scene, &set(position), count)).collect()
+        let mut sets = Vec::new();
+        let count = ((self.histories as f64 * crate::math::knob("SHARED", 1.0)) as u64 / positions)
+            .max(1)
+            .next_power_of_two() as u32;
+        for position in 0..positions {
+            sets.push(self.lit_points_of(scene, batch, position, count));
+        }
+        sets
+    }
+
+    /// The points of emitters that the points of continuations share in `batch`: a run for each of `groups` paths.
+    pub fn lit_points_of_continuations(&self, scene: &Scene, batch: u64, groups: usize) -> Connectors {
+        let count = (groups.next_power_of_two() * TOGETHER) as u32;
+        self.lit_points_of(scene, batch, u64::from(self.positions()), count)
+    }
+
+    fn lit_points_of(&self, scene: &Scene, batch: u64, position: u64, count: u32) -> Connectors {
+        let index = batch * (u64::from(self.positions()) + 1) + position;
+        lit_points(scene, &PointSet::new(&self.emitters, index, count.ilog2()), count)
     }
 
     /// Positions in a bin and batch.
@@ -148,7 +164,7 @@ impl ReceiverSet {
         let samples = emitter_samples(self.histories).div_ceil(u64::from(self.positions()));
         let there = receivers.iter().zip(rngs).filter_map(|(r, rng)| Some(((*r)?, rng)));
         let mut there: Vec<(Receiver, &mut Generator)> = there.collect();
-        let mut light = direct_light(scene, &mut there, shared, samples, what).into_iter();
+        let mut light = direct_light(scene, &mut there, Shared::all(shared), samples, what).into_iter();
         receivers.iter().map(|r| r.and_then(|_| light.next()).unwrap_or(Colour::BLACK)).collect()
     }
 }
