@@ -22,7 +22,7 @@ pub fn bench() {
         let bytes = std::fs::metadata(&path).expect("it was written").len();
         let sections = encoded(&tally);
         let encode = median_of(RUNS, || drop(black_box(encoded(&tally))));
-        let hash = median_of(RUNS, || sections.iter().for_each(|s| drop(black_box(blake3::hash(s)))));
+        let hash = median_of(RUNS, || sections.iter().for_each(|s| _ = black_box(blake3::hash(s))));
         let to = folder.path().join("plain");
         let disk = median_of(RUNS, || {
             replace(&to, |w| sections.iter().try_for_each(|s| w.write_all(s))).expect("the disk has room");
@@ -32,24 +32,15 @@ pub fn bench() {
             drop(black_box({ reader }.tally().expect("it is whole")));
         });
         println!(
-            "{channels}: {bytes} bytes, whole {:.0} ms = {:.2} % of 60 s; once each: encode {:.0}, hash {:.0}, write and \
-             sync {:.0} ms; read again {:.0} ms",
-            whole * 1e3,
-            whole / 0.6,
-            encode * 1e3,
-            hash * 1e3,
-            disk * 1e3,
-            read * 1e3
+            "{channels}: {bytes} bytes, whole {whole} ms = {:.2} % of 60 s; once each: encode by postcard {encode}, hash \
+             {hash}, write and sync {disk} ms; read again {read} ms",
+            whole.wall / 600.0
         );
         let batch = scores(&plan, 0);
         let mut sum = Tally::new(&plan.sets());
         let accumulate = median_of(RUNS, || sum.accumulate(&batch));
-        let digest = median_of(RUNS, || drop(black_box(batch.digest())));
-        println!(
-            "{channels}: a batch into the tally {:.1} ms, its digest {:.1} of them",
-            accumulate * 1e3,
-            digest * 1e3
-        );
+        let digest = median_of(RUNS, || _ = black_box(batch.digest()));
+        println!("{channels}: a batch into the tally {accumulate} ms, its digest {digest} of them");
     }
 }
 

@@ -8,7 +8,8 @@
 //! | `scaling` | one worker, two workers, one worker of two threads, and what the machine itself gives |
 //! | `memory` | state per bin and per triangle, and the element map that direct simulation would need |
 //!
-//! Without a part all are run. Everything lies in a temporary folder (5.5 GB for `merge`).
+//! Times are wall clock, in brackets CPU time: on a machine that others use the first says little by itself. Without a part all
+//! are run. Everything lies in a temporary folder (5.5 GB for `merge`).
 
 mod checkpoints;
 mod large;
@@ -19,9 +20,10 @@ mod scaling;
 mod start;
 
 use lampyris::tally::statistics::median;
+use nix::time::{ClockId, clock_gettime};
 use std::path::Path;
 use std::process::{Command, Stdio};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|word| word != "--bench").collect();
@@ -67,6 +69,18 @@ fn run(command: &mut Command) {
     assert!(command.status().expect("the program starts").success(), "{command:?}");
 }
 
+/// Wall clock and CPU time.
+struct Milliseconds {
+    wall: f64,
+    cpu: f64,
+}
+
+impl std::fmt::Display for Milliseconds {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        write!(f, "{:.0} ({:.0})", self.wall, self.cpu)
+    }
+}
+
 /// Wall clock of `work` \[s\], and what it made.
 fn timed<T>(work: impl FnOnce() -> T) -> (f64, T) {
     let start = Instant::now();
@@ -74,9 +88,24 @@ fn timed<T>(work: impl FnOnce() -> T) -> (f64, T) {
     (start.elapsed().as_secs_f64(), made)
 }
 
-/// Median wall clock of `runs` times `work` \[s\].
-fn median_of(runs: usize, mut work: impl FnMut()) -> f64 {
-    median((0..runs).map(|_| timed(&mut work).0))
+/// Median wall clock of `runs` times `work`, and median CPU time \[ms\].
+fn median_of(runs: usize, mut work: impl FnMut()) -> Milliseconds {
+    let both: Vec<[f64; 2]> = (0..runs).map(|_| timed(|| cpu_timed(&mut work).0)).map(|(w, c)| [w, c]).collect();
+    let [wall, cpu] = [0, 1].map(|i| 1e3 * median(both.iter().map(|run| run[i])));
+    Milliseconds { wall, cpu }
+}
+
+/// CPU time of this process so far, all threads \[s\]: whoever else uses the machine does not count.
+fn process_time() -> f64 {
+    let now = clock_gettime(ClockId::CLOCK_PROCESS_CPUTIME_ID).expect("Linux has this clock");
+    Duration::from(now).as_secs_f64()
+}
+
+/// CPU time of `work` \[s\], and what it made.
+fn cpu_timed<T>(work: impl FnOnce() -> T) -> (f64, T) {
+    let start = process_time();
+    let made = work();
+    (process_time() - start, made)
 }
 
 /// Peak memory of this process \[bytes\].

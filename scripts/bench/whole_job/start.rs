@@ -1,6 +1,6 @@
 //! From the start of `lampyris run` to the first batch in a checkpoint, and where that time goes.
 
-use super::{large, program, timed};
+use super::{cpu_timed, large, program, timed};
 use lampyris::farm::folder::Folder;
 use lampyris::farm::inputs::{load_scene, prepare};
 use lampyris::farm::pilot::bounds;
@@ -22,9 +22,10 @@ pub fn bench() {
             let first = median((0..RUNS).map(|_| to_first_checkpoint(&path, workers)));
             println!("{name}, {workers} workers: first batch in a checkpoint after {first:.2} s");
         }
-        let runs: Vec<Vec<(&str, f64)>> = (0..RUNS).map(|_| phases(&path)).collect();
+        let runs: Vec<Vec<(&str, [f64; 2])>> = (0..RUNS).map(|_| phases(&path)).collect();
         for (i, (phase, _)) in runs[0].iter().enumerate() {
-            println!("{name}: {:8.1} ms {phase}", 1e3 * median(runs.iter().map(|run| run[i].1)));
+            let [wall, cpu] = [0, 1].map(|time| 1e3 * median(runs.iter().map(|run| run[i].1[time])));
+            println!("{name}: {wall:8.1} ms ({cpu:.1}) {phase}");
         }
     }
 }
@@ -77,25 +78,31 @@ fn to_first_checkpoint(job: &Path, workers: &str) -> f64 {
     seconds
 }
 
-/// The same work inside this process, phase by phase, in the order of the program \[s\].
-fn phases(path: &Path) -> Vec<(&'static str, f64)> {
+/// Wall clock and CPU time of `work` \[s\], and what it made.
+fn both<T>(work: impl FnOnce() -> T) -> ([f64; 2], T) {
+    let (wall, (cpu, made)) = timed(|| cpu_timed(work));
+    ([wall, cpu], made)
+}
+
+/// The same work inside this process, phase by phase, in the order of the program.
+fn phases(path: &Path) -> Vec<(&'static str, [f64; 2])> {
     let out = tempfile::tempdir().expect("a temporary folder");
     let folder = Folder::new(&out.path().join("out"));
-    let (prepared, made) = timed(|| prepare(path).expect("the job is right"));
-    let (established, ()) = timed(|| folder.establish(&made.plan, &made.files).expect("the disk has room"));
+    let (prepared, made) = both(|| prepare(path).expect("the job is right"));
+    let (established, ()) = both(|| folder.establish(&made.plan, &made.files).expect("the disk has room"));
     let plan = &made.plan;
-    let (read, bytes) = timed(|| folder.read_input(&plan.inputs[0]).expect("it was written"));
+    let (read, bytes) = both(|| folder.read_input(&plan.inputs[0]).expect("it was written"));
     let no_other = &mut |uri: &str| panic!("{uri}: the scene is one file");
-    let (decoded, model) = timed(|| gltf::load("bench", &bytes, no_other).expect("the scene is right"));
+    let (decoded, model) = both(|| gltf::load("bench", &bytes, no_other).expect("the scene is right"));
     let corners = |t: &[u32; 3]| t.map(|v| model.positions[v as usize].as_vec3());
     let triangles: Vec<[Vec3; 3]> = model.triangles.iter().map(corners).collect();
-    let (built, mesh) = timed(|| Mesh::new(&triangles));
+    let (built, mesh) = both(|| Mesh::new(&triangles));
     drop(mesh);
-    let (joined, scene) = timed(|| Scene::new(model, &plan.job).expect("the scene is right"));
-    let (bounded, _) = timed(|| bounds(&plan.job, &scene));
-    let (realized, realization) = timed(|| Realization::new(&plan.job, &scene, &plan.bounds));
-    let (batch, _) = timed(|| realization.batch(0));
-    let (loaded, _) = timed(|| load_scene(&folder, plan).expect("the scene is right"));
+    let (joined, scene) = both(|| Scene::new(model, &plan.job).expect("the scene is right"));
+    let (bounded, _) = both(|| bounds(&plan.job, &scene));
+    let (realized, realization) = both(|| Realization::new(&plan.job, &scene, &plan.bounds));
+    let (batch, _) = both(|| realization.batch(0));
+    let (loaded, _) = both(|| load_scene(&folder, plan).expect("the scene is right"));
     vec![
         ("plan in all", prepared),
         ("  of it the pilot", bounded),

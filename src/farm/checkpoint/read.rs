@@ -1,15 +1,23 @@
 //! Checkpoint file -> header, blocks, tally.
 
-use super::{Checksum, Content, Header, MAGIC, MAX_HEADER, PREAMBLE, VERSION};
+use super::columns::{decode_moments, decode_replicates};
+use super::{Checksum, Content, Header, MAGIC, MAX_HEADER, PREAMBLE, Section, VERSION};
 use super::{block_count, block_range, checksum, layout};
 use crate::error::{Error, Result};
 use crate::farm::plan::Plan;
 use crate::job::{Kept, SetShape};
 use crate::tally::{FLUX_BINS, MomentBlock, Moments, Monitor, Replicates, SetTally, Tally};
+use nix::fcntl::{PosixFadviseAdvice, posix_fadvise};
 use serde::de::DeserializeOwned;
 use std::fs::File;
 use std::io::{self, ErrorKind, Read, Seek, SeekFrom};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
+
+/// How far ahead the system is asked to read \[bytes\].
+const AHEAD: u64 = 4 << 20;
+/// As much as it reads at one wish \[bytes\].
+const STRIDE: u64 = 1 << 20;
 
 /// An open checkpoint of a known plan and shard, its header checked.
 #[derive(Debug)]
@@ -20,6 +28,10 @@ pub struct Reader {
     /// Where the sections begin \[bytes\].
     base: u64,
     shapes: Vec<SetShape>,
+    /// The section read last.
+    buffer: Vec<u8>,
+    /// What the system was asked to fetch, counted from the end of the header \[bytes\].
+    asked: Range<u64>,
 }
 
 /// The header of the checkpoint of `shard` at `path`; None without a file.
@@ -46,7 +58,7 @@ impl Reader {
         let shapes = plan.sets();
         check_header(&header, plan, shard, &shapes).map_err(|reason| Error::refused(path, reason))?;
         check_sections(&header, size - base).map_err(|reason| Error::refused(path, reason))?;
-        Ok(Some(Reader { path: path.to_owned(), file, header, base, shapes }))
+        Ok(Some(Reader { path: path.to_owned(), file, header, base, shapes, buffer: Vec::new(), asked: 0..0 }))
     }
 
     /// What the file says about itself.
@@ -59,10 +71,11 @@ impl Reader {
     /// # Errors
     /// [`Error::Refused`] for damage; [`Error::Io`].
     pub fn moments(&mut self, set: usize, block: u32) -> Result<MomentBlock> {
-        let shape = self.shapes[set].clone();
+        let shape = &self.shapes[set];
         let colour = shape.kept == Kept::Moments { colour: true };
-        let bins = block_range(&shape, block).len();
-        self.section(Content::Moments { set: number(set), block }, |b: &MomentBlock| b.has_shape(bins, colour))
+        let bins = block_range(shape, block).len();
+        let content = Content::Moments { set: number(set), block };
+        self.section(content, decode_moments, |b| b.has_shape(bins, colour))
     }
 
     /// Every batch's score of a set.
@@ -71,7 +84,7 @@ impl Reader {
     /// [`Error::Refused`] for damage; [`Error::Io`].
     pub fn replicates(&mut self, set: usize) -> Result<Replicates> {
         let (bins, batches) = (self.shapes[set].bins(), self.header.batches());
-        self.section(Content::Replicates { set: number(set) }, |r: &Replicates| r.has_shape(bins, batches))
+        self.section(Content::Replicates { set: number(set) }, decode_replicates, |r| r.has_shape(bins, batches))
     }
 
     /// The flux balance, every batch.
@@ -80,7 +93,7 @@ impl Reader {
     /// [`Error::Refused`] for damage; [`Error::Io`].
     pub fn flux(&mut self) -> Result<Replicates> {
         let batches = self.header.batches();
-        self.section(Content::Flux, |r: &Replicates| r.has_shape(FLUX_BINS.len(), batches))
+        self.section(Content::Flux, decode_replicates, |r| r.has_shape(FLUX_BINS.len(), batches))
     }
 
     /// Direct light of a set that is the same in every batch; empty for zero everywhere.
@@ -89,7 +102,8 @@ impl Reader {
     /// [`Error::Refused`] for damage; [`Error::Io`].
     pub fn fixed_direct(&mut self, set: usize) -> Result<Vec<f64>> {
         let bins = self.shapes[set].bins();
-        self.section(Content::FixedDirect { set: number(set) }, |v: &Vec<f64>| v.is_empty() || v.len() == bins)
+        let fits = |v: &Vec<f64>| v.is_empty() || v.len() == bins;
+        self.section(Content::FixedDirect { set: number(set) }, decode, fits)
     }
 
     /// The monitored bins of a set, in their order; none where nothing is monitored.
@@ -104,7 +118,7 @@ impl Reader {
         let fits = |m: &Vec<Monitor>| {
             m.len() == bins.len() && m.iter().zip(&bins).all(|(monitor, &bin)| monitor.has_shape(bin, batches))
         };
-        self.section(Content::Monitors { set: number(set) }, fits)
+        self.section(Content::Monitors { set: number(set) }, decode, fits)
     }
 
     /// Checksums of the sections of fixed direct light, in set order: equal exactly when the light is.
@@ -134,16 +148,43 @@ impl Reader {
     }
 
     /// Reads, verifies and decodes the section holding `content`.
-    fn section<T: DeserializeOwned>(&mut self, content: Content, fits: impl Fn(&T) -> bool) -> Result<T> {
+    fn section<T>(
+        &mut self,
+        content: Content,
+        decode: impl Fn(&[u8]) -> Option<T>,
+        fits: impl Fn(&T) -> bool,
+    ) -> Result<T> {
         let section = self.header.sections[self.position(content)];
-        let sought = self.file.seek(SeekFrom::Start(self.base + section.offset));
-        let bytes = sought.and_then(|_| read_exactly(&mut self.file, section.bytes));
-        let bytes = bytes.map_err(|e| Fault::from(e).at(&self.path))?;
-        if checksum(&bytes) != section.checksum {
+        self.read(&section).map_err(|e| Fault::from(e).at(&self.path))?;
+        if checksum(&self.buffer) != section.checksum {
             return Err(Error::refused(&self.path, format!("damaged: wrong checksum of {content:?}")));
         }
-        let decoded = decode(&bytes).filter(|t| fits(t));
+        let decoded = decode(&self.buffer).filter(|t| fits(t));
         decoded.ok_or_else(|| Error::refused(&self.path, format!("damaged: {content:?} is not of the plan's shape")))
+    }
+
+    /// Reads the bytes of `section`, a length already checked against the size of the file.
+    fn read(&mut self, section: &Section) -> io::Result<()> {
+        self.ask_ahead(section.offset, section.offset + section.bytes);
+        let length = usize::try_from(section.bytes).map_err(|_| io::Error::from(ErrorKind::OutOfMemory))?;
+        self.buffer.resize(length, 0);
+        self.file.seek(SeekFrom::Start(self.base + section.offset))?;
+        self.file.read_exact(&mut self.buffer)
+    }
+
+    /// Asks the system to fetch what follows a section while that one is verified and merged. Only a wish: where it is
+    /// not heard, reading waits for the disk.
+    fn ask_ahead(&mut self, start: u64, end: u64) {
+        if !self.asked.contains(&start) {
+            self.asked = start..start;
+        }
+        let whole = self.header.sections.last().map_or(0, |last| last.offset + last.bytes);
+        let to = (end + AHEAD).min(whole);
+        while self.asked.end + STRIDE <= to {
+            let (at, length) = ((self.base + self.asked.end) as i64, STRIDE as i64);
+            let _ = posix_fadvise(&self.file, at, length, PosixFadviseAdvice::POSIX_FADV_WILLNEED);
+            self.asked.end += STRIDE;
+        }
     }
 
     /// Where `content` stands in the table, which was checked to be the layout of the plan.
