@@ -222,8 +222,8 @@ fn strays(words: &[&str], allowed: &[&str]) -> Vec<String> {
 }
 
 #[test]
-fn threads_are_in_the_realization_the_worker_and_the_loading_of_a_scene() {
-    let allowed = ["farm/realization.rs", "farm/worker.rs", "scene/", "geometry/"];
+fn threads_are_in_the_realization_the_worker_the_merge_and_the_loading_of_a_scene() {
+    let allowed = ["farm/realization.rs", "farm/worker.rs", "farm/merge/mod.rs", "scene/", "geometry/"];
     assert_eq!(strays(&["rayon", "par_iter", "thread::spawn"], &allowed), [""; 0]);
 }
 

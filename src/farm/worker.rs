@@ -112,7 +112,7 @@ impl<'a> Work<'a> {
         let path = folder.shard_path(shard);
         let mut work =
             Work { plan, shard, path, tally: Tally::new(&plan.sets()), fixed_direct: None, seconds: 0.0, saved: 0 };
-        if let Some(mut reader) = Reader::open(&work.path, plan, shard)? {
+        if let Some(reader) = Reader::open(&work.path, plan, shard)? {
             work.tally = reader.tally()?;
             let fixed = (0..plan.sets().len()).map(|set| reader.fixed_direct(set)).collect::<Result<_>>()?;
             work.fixed_direct = Some(fixed);

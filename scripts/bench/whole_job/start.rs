@@ -12,7 +12,7 @@ use lampyris::tally::statistics::median;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-const RUNS: usize = 5;
+const RUNS: usize = 3;
 
 /// The room of `jobs/room.toml`, and a million triangles.
 pub fn bench() {

@@ -10,13 +10,12 @@ use crate::tally::{FLUX_BINS, MomentBlock, Moments, Monitor, Replicates, SetTall
 use nix::fcntl::{PosixFadviseAdvice, posix_fadvise};
 use serde::de::DeserializeOwned;
 use std::fs::File;
-use std::io::{self, ErrorKind, Read, Seek, SeekFrom};
+use std::io::{self, ErrorKind, Read};
 use std::ops::Range;
+use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 
-/// How far ahead the system is asked to read \[bytes\].
-const AHEAD: u64 = 4 << 20;
-/// As much as it reads at one wish \[bytes\].
+/// As much as the system reads at one wish \[bytes\].
 const STRIDE: u64 = 1 << 20;
 
 /// An open checkpoint of a known plan and shard, its header checked.
@@ -28,10 +27,6 @@ pub struct Reader {
     /// Where the sections begin \[bytes\].
     base: u64,
     shapes: Vec<SetShape>,
-    /// The section read last.
-    buffer: Vec<u8>,
-    /// What the system was asked to fetch, counted from the end of the header \[bytes\].
-    asked: Range<u64>,
 }
 
 /// The header of the checkpoint of `shard` at `path`; None without a file.
@@ -58,7 +53,7 @@ impl Reader {
         let shapes = plan.sets();
         check_header(&header, plan, shard, &shapes).map_err(|reason| Error::refused(path, reason))?;
         check_sections(&header, size - base).map_err(|reason| Error::refused(path, reason))?;
-        Ok(Some(Reader { path: path.to_owned(), file, header, base, shapes, buffer: Vec::new(), asked: 0..0 }))
+        Ok(Some(Reader { path: path.to_owned(), file, header, base, shapes }))
     }
 
     /// What the file says about itself.
@@ -70,7 +65,7 @@ impl Reader {
     ///
     /// # Errors
     /// [`Error::Refused`] for damage; [`Error::Io`].
-    pub fn moments(&mut self, set: usize, block: u32) -> Result<MomentBlock> {
+    pub fn moments(&self, set: usize, block: u32) -> Result<MomentBlock> {
         let shape = &self.shapes[set];
         let colour = shape.kept == Kept::Moments { colour: true };
         let bins = block_range(shape, block).len();
@@ -82,7 +77,7 @@ impl Reader {
     ///
     /// # Errors
     /// [`Error::Refused`] for damage; [`Error::Io`].
-    pub fn replicates(&mut self, set: usize) -> Result<Replicates> {
+    pub fn replicates(&self, set: usize) -> Result<Replicates> {
         let (bins, batches) = (self.shapes[set].bins(), self.header.batches());
         self.section(Content::Replicates { set: number(set) }, decode_replicates, |r| r.has_shape(bins, batches))
     }
@@ -91,7 +86,7 @@ impl Reader {
     ///
     /// # Errors
     /// [`Error::Refused`] for damage; [`Error::Io`].
-    pub fn flux(&mut self) -> Result<Replicates> {
+    pub fn flux(&self) -> Result<Replicates> {
         let batches = self.header.batches();
         self.section(Content::Flux, decode_replicates, |r| r.has_shape(FLUX_BINS.len(), batches))
     }
@@ -100,7 +95,7 @@ impl Reader {
     ///
     /// # Errors
     /// [`Error::Refused`] for damage; [`Error::Io`].
-    pub fn fixed_direct(&mut self, set: usize) -> Result<Vec<f64>> {
+    pub fn fixed_direct(&self, set: usize) -> Result<Vec<f64>> {
         let bins = self.shapes[set].bins();
         let fits = |v: &Vec<f64>| v.is_empty() || v.len() == bins;
         self.section(Content::FixedDirect { set: number(set) }, decode, fits)
@@ -110,7 +105,7 @@ impl Reader {
     ///
     /// # Errors
     /// [`Error::Refused`] for damage; [`Error::Io`].
-    pub fn monitors(&mut self, set: usize) -> Result<Vec<Monitor>> {
+    pub fn monitors(&self, set: usize) -> Result<Vec<Monitor>> {
         let (bins, batches) = (self.shapes[set].monitored.clone(), self.header.batches());
         if bins.is_empty() {
             return Ok(Vec::new());
@@ -131,13 +126,13 @@ impl Reader {
     ///
     /// # Errors
     /// [`Error::Refused`] for damage; [`Error::Io`].
-    pub fn tally(&mut self) -> Result<Tally> {
+    pub fn tally(&self) -> Result<Tally> {
         let sets = (0..self.shapes.len()).map(|set| self.set_tally(set)).collect::<Result<_>>()?;
         let monitors = (0..self.shapes.len()).map(|set| self.monitors(set)).collect::<Result<_>>()?;
         Ok(Tally { sets, monitors, flux: self.flux()?, digests: self.header.digests.clone() })
     }
 
-    fn set_tally(&mut self, set: usize) -> Result<SetTally> {
+    fn set_tally(&self, set: usize) -> Result<SetTally> {
         let shape = self.shapes[set].clone();
         let Kept::Moments { colour } = shape.kept else { return Ok(SetTally::Replicates(self.replicates(set)?)) };
         let mut moments = Moments { n: self.header.batches(), bins: MomentBlock::new(0, colour) };
@@ -147,44 +142,38 @@ impl Reader {
         Ok(SetTally::Moments(moments))
     }
 
+    /// Asks the system to fetch `blocks` of a set from the disk, without waiting for them. Only a wish: where it is not
+    /// heard, whoever reads a block waits.
+    pub fn fetch(&self, set: usize, blocks: Range<u32>) {
+        let section = |block: u32| self.header.sections[self.position(Content::Moments { set: number(set), block })];
+        let Some(last) = blocks.clone().last().map(section) else { return };
+        for at in (section(blocks.start).offset..last.offset + last.bytes).step_by(STRIDE as usize) {
+            let (at, length) = ((self.base + at) as i64, STRIDE as i64);
+            let _ = posix_fadvise(&self.file, at, length, PosixFadviseAdvice::POSIX_FADV_WILLNEED);
+        }
+    }
+
     /// Reads, verifies and decodes the section holding `content`.
     fn section<T>(
-        &mut self,
+        &self,
         content: Content,
         decode: impl Fn(&[u8]) -> Option<T>,
         fits: impl Fn(&T) -> bool,
     ) -> Result<T> {
         let section = self.header.sections[self.position(content)];
-        self.read(&section).map_err(|e| Fault::from(e).at(&self.path))?;
-        if checksum(&self.buffer) != section.checksum {
+        let bytes = self.read(&section).map_err(|e| Fault::from(e).at(&self.path))?;
+        if checksum(&bytes) != section.checksum {
             return Err(Error::refused(&self.path, format!("damaged: wrong checksum of {content:?}")));
         }
-        let decoded = decode(&self.buffer).filter(|t| fits(t));
+        let decoded = decode(&bytes).filter(|t| fits(t));
         decoded.ok_or_else(|| Error::refused(&self.path, format!("damaged: {content:?} is not of the plan's shape")))
     }
 
-    /// Reads the bytes of `section`, a length already checked against the size of the file.
-    fn read(&mut self, section: &Section) -> io::Result<()> {
-        self.ask_ahead(section.offset, section.offset + section.bytes);
-        let length = usize::try_from(section.bytes).map_err(|_| io::Error::from(ErrorKind::OutOfMemory))?;
-        self.buffer.resize(length, 0);
-        self.file.seek(SeekFrom::Start(self.base + section.offset))?;
-        self.file.read_exact(&mut self.buffer)
-    }
-
-    /// Asks the system to fetch what follows a section while that one is verified and merged. Only a wish: where it is
-    /// not heard, reading waits for the disk.
-    fn ask_ahead(&mut self, start: u64, end: u64) {
-        if !self.asked.contains(&start) {
-            self.asked = start..start;
-        }
-        let whole = self.header.sections.last().map_or(0, |last| last.offset + last.bytes);
-        let to = (end + AHEAD).min(whole);
-        while self.asked.end + STRIDE <= to {
-            let (at, length) = ((self.base + self.asked.end) as i64, STRIDE as i64);
-            let _ = posix_fadvise(&self.file, at, length, PosixFadviseAdvice::POSIX_FADV_WILLNEED);
-            self.asked.end += STRIDE;
-        }
+    /// The bytes of `section`, a length already checked against the size of the file.
+    fn read(&self, section: &Section) -> io::Result<Vec<u8>> {
+        let mut bytes = zeros(section.bytes)?;
+        self.file.read_exact_at(&mut bytes, self.base + section.offset)?;
+        Ok(bytes)
     }
 
     /// Where `content` stands in the table, which was checked to be the layout of the plan.
@@ -299,10 +288,14 @@ fn check_sections(header: &Header, available: u64) -> std::result::Result<(), St
 
 /// Exactly `length` bytes, a length already checked against the size of the file.
 fn read_exactly(file: &mut File, length: u64) -> io::Result<Vec<u8>> {
-    let length = usize::try_from(length).map_err(|_| io::Error::from(ErrorKind::OutOfMemory))?;
-    let mut bytes = vec![0; length];
+    let mut bytes = zeros(length)?;
     file.read_exact(&mut bytes)?;
     Ok(bytes)
+}
+
+fn zeros(length: u64) -> io::Result<Vec<u8>> {
+    let length = usize::try_from(length).map_err(|_| io::Error::from(ErrorKind::OutOfMemory))?;
+    Ok(vec![0; length])
 }
 
 /// All of `bytes` as one value: a prefix is not enough. A hostile length inside cannot allocate much: serde
