@@ -10,12 +10,12 @@
 //! receivers     bins of a job -> receivers in a scene
 //! regions       parts of maps, one number a batch
 //! pilot         the bound of the kernel, fixed before the run
-//! realization   batch index -> scores: the only parallel computation
+//! realization   batch index -> scores, in parallel
 //! checkpoint    one durable file for each shard
 //! status        headers -> progress
 //! worker        computes one shard
 //! coordinator   starts, watches, restarts worker processes
-//! merge         checkpoints -> one result
+//! merge         checkpoints -> one result, in parallel
 //! ```
 
 pub mod checkpoint;

@@ -1,6 +1,6 @@
 //! One shard, from where its checkpoint left it: batch after batch into the tally, checkpoints in between.
 //!
-//! The only place with a thread pool, and with a clock that decides when to write. A worker knows neither other
+//! The only place that makes a thread pool, and that has a clock that decides when to write. A worker knows neither other
 //! workers nor the final map; two workers on one shard by mistake compute the same batches and do no harm.
 
 use super::checkpoint::{self, Reader, Snapshot};
