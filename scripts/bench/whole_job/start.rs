@@ -9,6 +9,9 @@ use lampyris::geometry::Mesh;
 use lampyris::math::Vec3;
 use lampyris::scene::{Scene, gltf};
 use lampyris::tally::statistics::median;
+use nix::sys::signal::{Signal, killpg};
+use nix::unistd::Pid;
+use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -63,17 +66,17 @@ fn to_first_checkpoint(job: &Path, workers: &str) -> f64 {
     let out = tempfile::tempdir().expect("a temporary folder");
     let (job, dir) = (job.display().to_string(), out.path().join("out"));
     let start = Instant::now();
-    let mut child = program(&["run", "-q", "-w", workers, &job, "-o", &dir.display().to_string()])
-        .spawn()
-        .expect("the program starts");
+    let mut command = program(&["run", "-q", "-w", workers, &job, "-o", &dir.display().to_string()]);
+    let mut child = command.process_group(0).spawn().expect("the program starts");
     let is_there = || Folder::new(&dir).checkpoints().is_ok_and(|found| !found.is_empty());
     while !is_there() {
         assert!(child.try_wait().expect("it is ours").is_none(), "it ended without a checkpoint");
         std::thread::sleep(Duration::from_millis(1));
     }
     let seconds = start.elapsed().as_secs_f64();
-    // Asked to stop it would finish its batches first.
-    child.kill().expect("it is ours");
+    // Its workers too: left alone or asked to stop, they would finish their batches first, and slow down what is measured next.
+    let group = Pid::from_raw(child.id().try_into().expect("process numbers fit"));
+    killpg(group, Signal::SIGKILL).expect("it is ours");
     child.wait().expect("it is ours");
     seconds
 }
