@@ -16,7 +16,7 @@ use crate::transport::receiver::Receiver;
 use crate::transport::trajectory::{Vertex, trace};
 
 /// c: chosen by measured figure of merit (docs/benchmarks.md).
-const SCORE_OF_A_HISTORY: f64 = 3.0;
+const SCORE_OF_A_HISTORY: f64 = 30.0;
 /// Trajectories of a pilot.
 const TRAJECTORIES: u64 = 1024;
 /// Bins of a set at which a pilot estimates.
@@ -70,7 +70,7 @@ fn bound_of_closed(scene: &Scene) -> f64 {
         area += side;
         reflecting += side * surface.reflectance.albedo(0.5).luminance();
     }
-    crate::math::knob("C", 3.0) * PI / (area * (1.0 - (reflecting / area).min(BRIGHTEST)))
+    SCORE_OF_A_HISTORY * PI / (area * (1.0 - (reflecting / area).min(BRIGHTEST)))
 }
 
 fn bound_of_set(job: &Job, scene: &Scene, set: &ReceiverSet) -> f64 {
@@ -95,7 +95,7 @@ fn bound_of_set(job: &Job, scene: &Scene, set: &ReceiverSet) -> f64 {
     let middle = found.len() / 2;
     let (_, illuminance, _) = found.select_nth_unstable_by(middle, f64::total_cmp);
     let flux = scene.sources.flux();
-    crate::math::knob("C", 3.0) * PI * *illuminance / (flux * leaving / arriving)
+    SCORE_OF_A_HISTORY * PI * *illuminance / (flux * leaving / arriving)
 }
 
 /// What a vertex reflects \[lm\].

@@ -16,8 +16,9 @@ use crate::transport::eye::{Eye, Gaze};
 use crate::transport::receiver::{Receiver, Seen, look_at};
 use crate::transport::shared::{Shared, TOGETHER, direct_light, lit_points};
 
-/// Points of emitters shared in a batch, over its histories: chosen by measured figure of merit (docs/benchmarks.md).
-const SHARED: u64 = 1;
+/// Histories of a batch for each point of an emitter that its receivers share: chosen by measured figure of merit
+/// (docs/benchmarks.md).
+const HISTORIES_OF_A_POINT: u64 = 2;
 
 /// What the positions of one bin say in one batch.
 pub struct Sensed {
