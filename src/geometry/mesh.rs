@@ -31,7 +31,7 @@ pub struct Mesh {
 /// A triangle as rays meet it.
 pub(super) struct Triangle {
     pub(super) corners: [Vec3; 3],
-    primitive: u32,
+    pub(super) primitive: u32,
 }
 
 impl Default for Mesh {
@@ -125,12 +125,24 @@ impl Mesh {
     fn closest_hit_near(&self, ray: &Ray) -> Option<Hit> {
         // Boxes and triangles must see the same ray, or a ray could pass between a box and its triangle.
         let (origin, direction) = (ray.origin.as_vec3(), ray.direction.as_vec3());
-        let (distance, primitive) = self.path.run(Closest { mesh: self, origin, direction })?;
-        let [a, b, c] = self.triangle(primitive);
-        let normal = (b - a).cross(c - a).normalize();
+        let (distance, place) = self.path.run(Closest { mesh: self, origin, direction })?;
+        Some(self.hit(ray, distance, place, self.plane(place)))
+    }
+
+    /// A corner and the unit normal of the triangle at `place`.
+    #[inline(always)]
+    pub(super) fn plane(&self, place: u32) -> (DVec3, DVec3) {
+        let [a, b, c] = self.triangles[place as usize].corners.map(|p| p.as_dvec3());
+        (a, (b - a).cross(c - a).normalize())
+    }
+
+    /// The hit at `distance` of the triangle at `place`, which lies in the plane through a corner with a unit normal.
+    #[inline(always)]
+    pub(super) fn hit(&self, ray: &Ray, distance: f64, place: u32, (corner, normal): (DVec3, DVec3)) -> Hit {
         let near = ray.origin + distance * ray.direction;
-        let position = near - normal.dot(near - a) * normal;
-        Some(Hit { primitive, ..hit(ray, distance, position, normal) })
+        let position = near - normal.dot(near - corner) * normal;
+        let primitive = self.triangles[place as usize].primitive;
+        Hit { primitive, ..hit(ray, distance, position, normal) }
     }
 
     /// True when a triangle crosses the segment from `a` to `b`, ends excluded.
@@ -211,9 +223,9 @@ impl Iterator for Bits {
 }
 
 /// Nodes that wait for a ray; memory is asked for only in hierarchies of unusual depth.
-type Stack<T> = SmallVec<[T; 96]>;
+pub(super) type Stack<T> = SmallVec<[T; 96]>;
 
-/// The nearest triangle along a ray: distance and primitive.
+/// The nearest triangle along a ray: distance and place.
 struct Closest<'a> {
     mesh: &'a Mesh,
     origin: Vec3,
@@ -229,6 +241,7 @@ impl Kernel for Closest<'_> {
         let (o, d) = (origin.as_dvec3(), direction.as_dvec3());
         let ray = BoxRay::<I>::new(origin, direction);
         let mut best: Option<(f64, u32)> = None;
+        let mut place = 0;
         // A box that begins at this very distance may hold a lower primitive number, hence the rounding up.
         let mut end = f32::INFINITY;
         let mut stack: Stack<(f32, u32)> = Stack::new();
@@ -249,19 +262,20 @@ impl Kernel for Closest<'_> {
                     let Some(t) = triangle.intersect(o, d, limit) else { continue };
                     if best.is_none_or(|b| (t, triangle.primitive) < b) {
                         best = Some((t, triangle.primitive));
+                        place = first + lane;
                         end = (t * (1.0 + 1e-6)) as f32;
                     }
                 }
             }
             push_sorted(&mut stack, bits(met & !node.blocks).map(|slot| (times[slot], node.child[slot])));
         }
-        best
+        best.map(|(t, _)| (t, place as u32))
     }
 }
 
 /// Pushes nodes, the nearest last.
 #[inline(always)]
-fn push_sorted(stack: &mut Stack<(f32, u32)>, nodes: impl Iterator<Item = (f32, u32)>) {
+pub(super) fn push_sorted(stack: &mut Stack<(f32, u32)>, nodes: impl Iterator<Item = (f32, u32)>) {
     let bottom = stack.len();
     for node in nodes {
         stack.push(node);
@@ -310,10 +324,10 @@ impl Kernel for Any<'_> {
 impl Triangle {
     /// Parameter 0 < t <= limit at which the line o + t d crosses the triangle, edges included.
     #[inline(always)]
-    fn intersect(&self, o: DVec3, d: DVec3, limit: f64) -> Option<f64> {
+    pub(super) fn intersect(&self, o: DVec3, d: DVec3, limit: f64) -> Option<f64> {
         let [a, b, c] = self.corners.map(|p| p.as_dvec3());
-        let normal = (b - a).cross(c - a);
-        let t = (normal.dot(a) - normal.dot(o)) / normal.dot(d);
+        let (normal, numerator) = self.plane_from(o);
+        let t = numerator / normal.dot(d);
         // Edge-on the quotient is infinite or undefined: a triangle seen edge-on is not there.
         if !(t > 0.0 && t <= limit && t.is_finite()) {
             return None;
@@ -322,6 +336,14 @@ impl Triangle {
         let edges = [d.dot(c.cross(b)), d.dot(a.cross(c)), d.dot(b.cross(a))];
         let one_side = edges.iter().all(|&e| e >= 0.0) || edges.iter().all(|&e| e <= 0.0);
         one_side.then_some(t)
+    }
+
+    /// N, of the length of twice the area, and N . (A - `o`): rays along d from `o` meet the plane at their quotient by N . d.
+    #[inline(always)]
+    pub(super) fn plane_from(&self, o: DVec3) -> (DVec3, f64) {
+        let [a, b, c] = self.corners.map(|p| p.as_dvec3());
+        let normal = (b - a).cross(c - a);
+        (normal, normal.dot(a) - normal.dot(o))
     }
 
     /// True when the segment from `o` along `d` crosses the triangle, edges included and ends excluded.

@@ -206,6 +206,20 @@ impl<I: Isa> Planes<I> {
         !miss | self.doubtful
     }
 
+    /// The triangles that some ray in a box of directions, of any length, may cross.
+    #[inline(always)]
+    pub(super) fn toward(&self, directions: &Directions) -> u32 {
+        let center = splat::<I>(directions.center);
+        let half = splat::<I>(directions.half);
+        let negative = I::Eight::splat(-self.edge_tolerance);
+        let mut miss = 0;
+        for edge in &self.edges {
+            let (middle, spread) = (dot::<I>(*edge, center), dot::<I>(abs::<I>(*edge), half));
+            miss |= middle.add(spread).less(negative);
+        }
+        !miss | self.doubtful
+    }
+
     /// To memory, from where single triangles are taken.
     #[inline(always)]
     pub(super) fn store(&self, rows: &mut Rows) {
@@ -253,6 +267,23 @@ impl Rows {
         let miss = inside.less(I::Sixteen::splat(-edge)) | beyond.less(I::Sixteen::splat(-face));
         let hit = I::Sixteen::splat(edge).less(inside) & I::Sixteen::splat(face).less(beyond);
         Decided { miss, hit }
+    }
+
+    /// The triangle in `lane` against 16 rays along `d` that end at `ends`: which surely miss it, or meet it
+    /// later, and which surely cross it, if they meet its plane.
+    #[inline(always)]
+    pub(super) fn test_rays<I: Isa>(&self, lane: usize, d: &[I::Sixteen; 3], ends: I::Sixteen) -> Decided {
+        if self.doubtful >> lane & 1 == 1 {
+            return Decided { miss: 0, hit: 0 };
+        }
+        let [first, second, third] = &self.edges;
+        let inside = along::<I>(first, lane, d).min(along::<I>(second, lane, d)).min(along::<I>(third, lane, d));
+        let (edge, face) = (self.edge_tolerance, self.face_tolerance);
+        // N . d of a unit vector d; where it is not positive, neither is the product.
+        let toward = along::<I>(&self.face, lane, d).add(I::Sixteen::splat(FACE));
+        let late = toward.mul(ends).less(I::Sixteen::splat(self.volume[lane] - face));
+        let miss = inside.less(I::Sixteen::splat(-edge)) | late;
+        Decided { miss, hit: I::Sixteen::splat(edge).less(inside) }
     }
 }
 
