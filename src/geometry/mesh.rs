@@ -126,23 +126,8 @@ impl Mesh {
         // Boxes and triangles must see the same ray, or a ray could pass between a box and its triangle.
         let (origin, direction) = (ray.origin.as_vec3(), ray.direction.as_vec3());
         let (distance, place) = self.path.run(Closest { mesh: self, origin, direction })?;
-        Some(self.hit(ray, distance, place, self.plane(place)))
-    }
-
-    /// A corner and the unit normal of the triangle at `place`.
-    #[inline(always)]
-    pub(super) fn plane(&self, place: u32) -> (DVec3, DVec3) {
-        let [a, b, c] = self.triangles[place as usize].corners.map(|p| p.as_dvec3());
-        (a, (b - a).cross(c - a).normalize())
-    }
-
-    /// The hit at `distance` of the triangle at `place`, which lies in the plane through a corner with a unit normal.
-    #[inline(always)]
-    pub(super) fn hit(&self, ray: &Ray, distance: f64, place: u32, (corner, normal): (DVec3, DVec3)) -> Hit {
-        let near = ray.origin + distance * ray.direction;
-        let position = near - normal.dot(near - corner) * normal;
-        let primitive = self.triangles[place as usize].primitive;
-        Hit { primitive, ..hit(ray, distance, position, normal) }
+        let triangle = &self.triangles[place as usize];
+        Some(triangle.face().hit(ray, distance, triangle.primitive))
     }
 
     /// True when a triangle crosses the segment from `a` to `b`, ends excluded.
@@ -321,7 +306,29 @@ impl Kernel for Any<'_> {
     }
 }
 
+/// The plane of a triangle, by a corner \[m\] and the unit normal.
+pub(super) struct Face {
+    corner: DVec3,
+    normal: DVec3,
+}
+
+impl Face {
+    /// The hit of `ray` at `distance` on this face of `primitive`.
+    #[inline(always)]
+    pub(super) fn hit(&self, ray: &Ray, distance: f64, primitive: u32) -> Hit {
+        let near = ray.origin + distance * ray.direction;
+        let position = near - self.normal.dot(near - self.corner) * self.normal;
+        Hit { primitive, ..hit(ray, distance, position, self.normal) }
+    }
+}
+
 impl Triangle {
+    #[inline(always)]
+    pub(super) fn face(&self) -> Face {
+        let [a, b, c] = self.corners.map(|p| p.as_dvec3());
+        Face { corner: a, normal: (b - a).cross(c - a).normalize() }
+    }
+
     /// Parameter 0 < t <= limit at which the line o + t d crosses the triangle, edges included.
     #[inline(always)]
     pub(super) fn intersect(&self, o: DVec3, d: DVec3, limit: f64) -> Option<f64> {

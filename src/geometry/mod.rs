@@ -114,9 +114,12 @@ impl Geometry {
     /// What [`Geometry::closest_hit`] gives for each of `rays`, to `hits`, of the same length. Rays from one point go
     /// several times faster in this way, where 16 that follow each other point in nearly the same direction.
     pub fn closest_hits(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        assert_eq!(rays.len(), hits.len(), "a hit for each ray");
         self.mesh.closest_hits(rays, hits);
-        for (ray, hit) in rays.iter().zip(hits) {
-            *hit = self.closest_of_all(ray, *hit);
+        if !self.spheres.is_empty() || !self.planes.is_empty() {
+            for (ray, hit) in rays.iter().zip(hits) {
+                *hit = self.closest_of_all(ray, *hit);
+            }
         }
     }
 

@@ -1,16 +1,16 @@
 //! Sixteen rays from one point through the mesh at once, for camera rays: each hit is that of the ray alone.
 //!
 //! Rays of a packet have a common origin and directions close together. The shaft around them finds the boxes that
-//! any of them may meet, nearest first; each box is then asked of the sixteen rays, up to the nearest triangle that each has
-//! met so far; and the triangles of a block are planes through the origin, the same for all rays:
+//! any of them may meet, nearest first; each box is then asked of the sixteen rays, up to where each surely ends; and the
+//! triangles of a block are planes through the origin, the same for all rays:
 //!
 //! ```text
 //! shaft against nodes -> 16 rays against a box -> 8 triangles as planes -> 16 rays against a triangle -> distances in f64
 //! ```
 //!
-//! All but the last is conservative. Distances are computed in f64 by the formula of
-//! [`Triangle::intersect`](super::mesh::Triangle::intersect), whose first half the rays share; rays that pass an edge too closely
-//! for f32 are asked one by one.
+//! All but the last is conservative: what a ray surely crosses gives an upper bound of its end, and what begins beyond that is
+//! left out. A ray that passes an edge too closely for f32 asks [`Triangle::intersect`](super::mesh::Triangle::intersect). Of the
+//! triangles that are left, mostly one, the nearest is found in f64, by the formula that single rays use.
 
 use super::bvh::{Node, WIDTH};
 use super::mesh::{Mesh, Stack, bits, push_sorted};
@@ -19,6 +19,7 @@ use super::shaft::{Bundle, Shaft};
 use super::simd::{Isa, Kernel, Vector};
 use super::{Hit, Ray};
 use crate::math::{DVec3, Vec3};
+use smallvec::SmallVec;
 
 /// Rays of a packet: the lanes of a vector.
 const RAYS: usize = 16;
@@ -46,17 +47,17 @@ impl Kernel for Packets<'_> {
 
     #[inline(always)]
     fn run<I: Isa>(self) {
-        let mut rows = Rows::default();
+        let mut work = Work::default();
         for (rays, hits) in self.rays.chunks(RAYS).zip(self.hits.chunks_mut(RAYS)) {
             match Directions::common(self.mesh, rays) {
-                Some(directions) => packet::<I>(self.mesh, rays, &directions, hits, &mut rows),
+                Some(directions) => Search::<I>::new(self.mesh, rays, &directions, &mut work).run(rays, hits),
                 None => rays.iter().zip(hits).for_each(|(ray, hit)| *hit = self.mesh.closest_hit(ray)),
             }
         }
     }
 }
 
-/// The directions of a packet, by axis, as the mesh sees them.
+/// The directions of a packet, by axis, as the mesh sees them; unused lanes repeat the first.
 struct Directions {
     each: [[f32; RAYS]; 3],
     least: [f32; 3],
@@ -64,141 +65,106 @@ struct Directions {
 }
 
 impl Directions {
-    /// Of `rays`, if they start in one point near the mesh and lie close together; unused lanes repeat the first.
+    /// Of `rays`, if they start in one point near the mesh and lie close together.
     #[inline(always)]
     fn common(mesh: &Mesh, rays: &[Ray]) -> Option<Self> {
-        let origin = rays[0].origin;
-        if rays.len() < RAYS / 2 || mesh.is_empty() || !mesh.is_near(origin) || rays.iter().any(|r| r.origin != origin)
-        {
+        let Ray { origin, direction } = rays[0];
+        if rays.len() < RAYS / 2 || mesh.is_empty() || !mesh.is_near(origin) {
             return None;
         }
-        let first = rays[0].direction.as_vec3().to_array();
-        let mut d = Directions { each: first.map(|x| [x; RAYS]), least: first, most: first };
-        for (lane, ray) in rays.iter().enumerate() {
-            let direction = ray.direction.as_vec3();
+        let mut exact = direction.to_array().map(|x| [x; RAYS]);
+        let mut common = true;
+        for (lane, ray) in rays.iter().enumerate().take(RAYS) {
+            common &= ray.origin == origin;
             for axis in 0..3 {
-                d.each[axis][lane] = direction[axis];
-                d.least[axis] = d.least[axis].min(direction[axis]);
-                d.most[axis] = d.most[axis].max(direction[axis]);
+                exact[axis][lane] = ray.direction[axis];
             }
         }
-        (0..3).all(|axis| d.most[axis] - d.least[axis] < COHERENT).then_some(d)
+        if !common {
+            return None;
+        }
+        let each = exact.map(|lanes| lanes.map(|x| x as f32));
+        let least = each.map(|lanes| reduce(lanes, |a, b| if a < b { a } else { b }));
+        let most = each.map(|lanes| reduce(lanes, |a, b| if a > b { a } else { b }));
+        (0..3).all(|axis| most[axis] - least[axis] < COHERENT).then_some(Directions { each, least, most })
     }
 }
 
+/// All lanes by `f`, in a tree.
 #[inline(always)]
-fn packet<I: Isa>(mesh: &Mesh, rays: &[Ray], directions: &Directions, hits: &mut [Option<Hit>], rows: &mut Rows) {
-    let best = Search::<I>::new(mesh, rays[0].origin.as_vec3(), directions, rows).run();
-    // Neighbours often lie on one triangle.
-    let (mut seen, mut plane) = (NONE, (DVec3::ZERO, DVec3::ZERO));
-    for (lane, (ray, hit)) in rays.iter().zip(hits).enumerate() {
-        let place = best.place[lane];
-        if place == NONE {
-            *hit = None;
-            continue;
+fn reduce(mut lanes: [f32; RAYS], f: impl Fn(f32, f32) -> f32) -> f32 {
+    for half in [8, 4, 2, 1] {
+        for i in 0..half {
+            lanes[i] = f(lanes[i], lanes[i + half]);
         }
-        if place != seen {
-            (seen, plane) = (place, mesh.plane(place));
-        }
-        *hit = Some(mesh.hit(ray, best.distance[lane], place, plane));
     }
+    lanes[0]
 }
 
-/// Stands for no triangle.
-const NONE: u32 = u32::MAX;
-
-/// The nearest triangles so far, by ray.
-struct Best {
-    distance: [f64; RAYS],
-    primitive: [u32; RAYS],
+/// A triangle that rays cross.
+struct Candidate {
     /// In the order of the blocks.
-    place: [u32; RAYS],
-    /// Upper bounds of the distances.
-    ends: [f32; RAYS],
-    /// The largest of them.
-    end: f32,
+    place: u32,
+    lanes: u32,
+    /// Lower bounds of the distances \[m\].
+    early: [f32; RAYS],
 }
 
-impl Best {
-    /// Takes the triangle at `place` for the rays of `lanes` that meet it at the distances `t` before any other.
-    #[inline(always)]
-    fn offer(&mut self, lanes: u32, t: &[f64; RAYS], primitive: u32, place: u32) {
-        let mut end = 0.0f32;
-        for lane in 0..RAYS {
-            let (t, best) = (t[lane], self.distance[lane]);
-            let nearer = t < best || (t == best && primitive < self.primitive[lane]);
-            let taken = (lanes >> lane & 1 == 1) & (t > 0.0) & (t < f64::INFINITY) & nearer;
-            self.distance[lane] = if taken { t } else { best };
-            self.primitive[lane] = if taken { primitive } else { self.primitive[lane] };
-            self.place[lane] = if taken { place } else { self.place[lane] };
-            // Rounded up, as for a single ray.
-            self.ends[lane] = if taken { (t * (1.0 + 1e-6)) as f32 } else { self.ends[lane] };
-            end = end.max(self.ends[lane]);
-        }
-        self.end = end;
-    }
+/// Memory for many packets.
+#[derive(Default)]
+struct Work {
+    rows: Rows,
+    candidates: SmallVec<[Candidate; 8]>,
+    /// Boxes by node and slot, and when the first ray enters them \[m\].
+    open: Stack<(f32, u32)>,
 }
 
 /// A packet on its way through the hierarchy.
 struct Search<'a, I: Isa> {
     mesh: &'a Mesh,
     apex: [f32; 3],
-    origin: DVec3,
+    directions: &'a Directions,
     shaft: Shaft,
     d: [I::Sixteen; 3],
     bundle: Bundle<I>,
-    /// The directions in f64, by axis.
-    directions: [[f64; RAYS]; 3],
-    rows: &'a mut Rows,
-    best: Best,
+    work: &'a mut Work,
+    /// Upper bounds of the distances of the hits, negative in unused lanes \[m\].
+    ends: [f32; RAYS],
+    /// The largest of them.
+    end: f32,
 }
 
 impl<'a, I: Isa> Search<'a, I> {
     #[inline(always)]
-    fn new(mesh: &'a Mesh, origin: Vec3, directions: &Directions, rows: &'a mut Rows) -> Self {
-        let apex = origin.to_array();
+    fn new(mesh: &'a Mesh, rays: &[Ray], directions: &'a Directions, work: &'a mut Work) -> Self {
+        let apex = rays[0].origin.as_vec3().to_array();
         let [x, y, z] = &directions.each;
         let d = [I::Sixteen::load(x), I::Sixteen::load(y), I::Sixteen::load(z)];
-        let far = f32::INFINITY;
-        Search {
-            mesh,
-            apex,
-            origin: origin.as_dvec3(),
-            shaft: Shaft::along(apex, directions.least, directions.most),
-            d,
-            bundle: Bundle::new(&d),
-            directions: [x.map(f64::from), y.map(f64::from), z.map(f64::from)],
-            rows,
-            best: Best {
-                distance: [f64::INFINITY; RAYS],
-                primitive: [NONE; RAYS],
-                place: [NONE; RAYS],
-                ends: [far; RAYS],
-                end: far,
-            },
-        }
+        let mut ends = [f32::INFINITY; RAYS];
+        ends.iter_mut().skip(rays.len()).for_each(|end| *end = -1.0);
+        let shaft = Shaft::along(apex, directions.least, directions.most);
+        Search { mesh, apex, directions, shaft, d, bundle: Bundle::new(&d), work, ends, end: f32::INFINITY }
     }
 
     #[inline(always)]
-    fn run(mut self) -> Best {
-        // A box is on the stack by its node and slot.
-        let mut open: Stack<(f32, u32)> = Stack::new();
+    fn run(mut self, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        self.work.candidates.clear();
         let mut next = Some(0);
         loop {
             if let Some(number) = next.take() {
                 let node = &self.mesh.bvh.nodes[number as usize];
-                let (met, enter) = self.shaft.meets_before::<I>(node, self.best.end);
+                let (met, enter) = self.shaft.meets_before::<I>(node, self.end);
                 let mut times = [0.0; WIDTH];
                 enter.store(&mut times);
-                push_sorted(&mut open, bits(met).map(|slot| (times[slot], number * WIDTH as u32 + slot as u32)));
+                let boxes = bits(met).map(|slot| (times[slot], number * WIDTH as u32 + slot as u32));
+                push_sorted(&mut self.work.open, boxes);
             }
-            let Some((time, at)) = open.pop() else { return self.best };
-            if time > self.best.end {
+            let Some((time, at)) = self.work.open.pop() else { return self.finish(rays, hits) };
+            if time > self.end {
                 continue;
             }
             let (node, slot) = (&self.mesh.bvh.nodes[at as usize / WIDTH], at as usize % WIDTH);
-            let ends = I::Sixteen::load(&self.best.ends);
-            let met = self.bundle.meets_before(node, slot, self.apex, ends) & ALL;
+            let met = self.bundle.meets_before(node, slot, self.apex, I::Sixteen::load(&self.ends)) & ALL;
             if met == 0 {
                 continue;
             }
@@ -222,35 +188,82 @@ impl<'a, I: Isa> Search<'a, I> {
         if may == 0 {
             return;
         }
-        planes.store(self.rows);
+        planes.store(&mut self.work.rows);
         let first = self.mesh.bvh.firsts[number];
         for lane in bits(may) {
-            let decided = self.rows.test_rays::<I>(lane, &self.d, I::Sixteen::load(&self.best.ends));
-            let left = met & !decided.miss;
-            if left != 0 {
-                self.triangle(first + lane as u32, left & decided.hit, left & !decided.hit);
+            self.triangle(lane, first + lane as u32, met);
+        }
+        self.end = reduce(self.ends, |a, b| if a > b { a } else { b });
+    }
+
+    /// The triangle in a lane of the rows against the rays `met`.
+    #[inline(always)]
+    fn triangle(&mut self, lane: usize, place: u32, met: u32) {
+        let meeting = self.work.rows.meets::<I>(lane, &self.d);
+        let ends = I::Sixteen::load(&self.ends);
+        let sure = meeting.sure & met & !ends.less(meeting.early);
+        let unsure = meeting.may & met & !meeting.sure;
+        if sure | unsure == 0 {
+            return;
+        }
+        let mut candidate = Candidate { place, lanes: sure, early: [0.0; RAYS] };
+        meeting.early.store(&mut candidate.early);
+        if sure != 0 {
+            let nearer = sure & meeting.late.less(ends);
+            // Either is 0 where the other is not: the sum of bits is a choice.
+            meeting.late.select(nearer).add(ends.select(ALL & !nearer)).store(&mut self.ends);
+        }
+        if unsure != 0 {
+            self.ask_f64(&mut candidate, unsure);
+        }
+        if candidate.lanes != 0 {
+            self.work.candidates.push(candidate);
+        }
+    }
+
+    /// Decides which of the rays `unsure` cross the triangle.
+    #[cold]
+    #[inline(never)]
+    fn ask_f64(&mut self, candidate: &mut Candidate, unsure: u32) {
+        let triangle = &self.mesh.triangles[candidate.place as usize];
+        let origin = Vec3::from(self.apex).as_dvec3();
+        for lane in bits(unsure) {
+            if let Some(t) = triangle.intersect(origin, self.direction(lane), f64::INFINITY) {
+                candidate.lanes |= 1 << lane;
+                candidate.early[lane] = (t * (1.0 - 1e-6)) as f32;
+                self.ends[lane] = self.ends[lane].min((t * (1.0 + 1e-6)) as f32);
             }
         }
     }
 
-    /// One triangle against rays that surely cross it if they meet its plane, and others that may.
     #[inline(always)]
-    fn triangle(&mut self, place: u32, sure: u32, doubtful: u32) {
-        let triangle = &self.mesh.triangles[place as usize];
-        let (normal, numerator) = triangle.plane_from(self.origin);
-        let [x, y, z] = &self.directions;
-        let mut t = [0.0; RAYS];
-        for (lane, t) in t.iter_mut().enumerate() {
-            *t = numerator / normal.dot(DVec3::new(x[lane], y[lane], z[lane]));
-        }
-        let mut lanes = sure;
-        for lane in bits(doubtful) {
-            let d = DVec3::new(x[lane], y[lane], z[lane]);
-            let crosses = triangle.intersect(self.origin, d, self.best.distance[lane]).is_some();
-            lanes |= u32::from(crosses) << lane;
-        }
-        if lanes != 0 {
-            self.best.offer(lanes, &t, triangle.primitive, place);
+    fn direction(&self, lane: usize) -> DVec3 {
+        let [x, y, z] = &self.directions.each;
+        Vec3::new(x[lane], y[lane], z[lane]).as_dvec3()
+    }
+
+    /// The nearest candidate of each ray.
+    #[inline(always)]
+    fn finish(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        hits.fill(None);
+        let origin = Vec3::from(self.apex).as_dvec3();
+        let mut best = [(f64::INFINITY, u32::MAX); RAYS];
+        for candidate in &self.work.candidates {
+            let late = I::Sixteen::load(&self.ends).less(I::Sixteen::load(&candidate.early));
+            let lanes = candidate.lanes & !late;
+            if lanes == 0 {
+                continue;
+            }
+            let triangle = &self.mesh.triangles[candidate.place as usize];
+            let (normal, numerator) = triangle.plane_from(origin);
+            let face = triangle.face();
+            for lane in bits(lanes) {
+                let t = numerator / normal.dot(self.direction(lane));
+                if (t, triangle.primitive) < best[lane] {
+                    best[lane] = (t, triangle.primitive);
+                    hits[lane] = Some(face.hit(&rays[lane], t, triangle.primitive));
+                }
+            }
         }
     }
 }

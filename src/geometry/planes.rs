@@ -269,22 +269,31 @@ impl Rows {
         Decided { miss, hit }
     }
 
-    /// The triangle in `lane` against 16 rays along `d` that end at `ends`: which surely miss it, or meet it
-    /// later, and which surely cross it, if they meet its plane.
+    /// The triangle in `lane` against 16 rays along unit vectors `d`.
     #[inline(always)]
-    pub(super) fn test_rays<I: Isa>(&self, lane: usize, d: &[I::Sixteen; 3], ends: I::Sixteen) -> Decided {
-        if self.doubtful >> lane & 1 == 1 {
-            return Decided { miss: 0, hit: 0 };
-        }
+    pub(super) fn meets<I: Isa>(&self, lane: usize, d: &[I::Sixteen; 3]) -> Meeting<I> {
         let [first, second, third] = &self.edges;
         let inside = along::<I>(first, lane, d).min(along::<I>(second, lane, d)).min(along::<I>(third, lane, d));
-        let (edge, face) = (self.edge_tolerance, self.face_tolerance);
-        // N . d of a unit vector d; where it is not positive, neither is the product.
-        let toward = along::<I>(&self.face, lane, d).add(I::Sixteen::splat(FACE));
-        let late = toward.mul(ends).less(I::Sixteen::splat(self.volume[lane] - face));
-        let miss = inside.less(I::Sixteen::splat(-edge)) | late;
-        Decided { miss, hit: I::Sixteen::splat(edge).less(inside) }
+        let toward = along::<I>(&self.face, lane, d);
+        let (edge, face, volume) = (I::Sixteen::splat(self.edge_tolerance), self.face_tolerance, self.volume[lane]);
+        let slope = I::Sixteen::splat(FACE);
+        let miss = inside.less(I::Sixteen::splat(-self.edge_tolerance)) | toward.less(I::Sixteen::splat(-FACE));
+        let early = I::Sixteen::splat((volume - face) * (1.0 - 8.0 * U)).div(toward.add(slope));
+        let late = I::Sixteen::splat((volume + face) * (1.0 + 8.0 * U)).div(toward.sub(slope));
+        if self.doubtful >> lane & 1 == 1 {
+            return Meeting { may: u32::MAX, sure: 0, early, late };
+        }
+        Meeting { may: !miss, sure: edge.less(inside) & slope.less(toward), early, late }
     }
+}
+
+/// How 16 rays meet a triangle: the ones that may cross it, and the ones that surely do, at distances between `early` and `late`.
+#[derive(Clone, Copy)]
+pub(super) struct Meeting<I: Isa> {
+    pub(super) may: u32,
+    pub(super) sure: u32,
+    pub(super) early: I::Sixteen,
+    pub(super) late: I::Sixteen,
 }
 
 /// The scalar products of one normal with 16 directions.
