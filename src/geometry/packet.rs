@@ -49,7 +49,7 @@ impl Kernel for Packets<'_> {
     fn run<I: Isa>(self) {
         let mut work = Work::default();
         for (rays, hits) in self.rays.chunks(RAYS).zip(self.hits.chunks_mut(RAYS)) {
-            match Directions::common(self.mesh, rays) {
+            match Directions::common::<I>(self.mesh, rays) {
                 Some(directions) => Search::<I>::new(self.mesh, rays, &directions, &mut work).run(rays, hits),
                 None => rays.iter().zip(hits).for_each(|(ray, hit)| *hit = self.mesh.closest_hit(ray)),
             }
@@ -67,12 +67,12 @@ struct Directions {
 impl Directions {
     /// Of `rays`, if they start in one point near the mesh and lie close together.
     #[inline(always)]
-    fn common(mesh: &Mesh, rays: &[Ray]) -> Option<Self> {
+    fn common<I: Isa>(mesh: &Mesh, rays: &[Ray]) -> Option<Self> {
         let Ray { origin, direction } = rays[0];
         if rays.len() < RAYS / 2 || mesh.is_empty() || !mesh.is_near(origin) {
             return None;
         }
-        let mut exact = direction.to_array().map(|x| [x; RAYS]);
+        let mut exact = [[direction.x; RAYS], [direction.y; RAYS], [direction.z; RAYS]];
         let mut common = true;
         for (lane, ray) in rays.iter().enumerate().take(RAYS) {
             common &= ray.origin == origin;
@@ -83,22 +83,29 @@ impl Directions {
         if !common {
             return None;
         }
-        let each = exact.map(|lanes| lanes.map(|x| x as f32));
-        let least = each.map(|lanes| reduce(lanes, |a, b| if a < b { a } else { b }));
-        let most = each.map(|lanes| reduce(lanes, |a, b| if a > b { a } else { b }));
-        (0..3).all(|axis| most[axis] - least[axis] < COHERENT).then_some(Directions { each, least, most })
+        let mut d = Directions { each: [[0.0; RAYS]; 3], least: [0.0; 3], most: [0.0; 3] };
+        for axis in 0..3 {
+            for lane in 0..RAYS {
+                d.each[axis][lane] = exact[axis][lane] as f32;
+            }
+            (d.least[axis], d.most[axis]) = range::<I>(&d.each[axis]);
+        }
+        (0..3).all(|axis| d.most[axis] - d.least[axis] < COHERENT).then_some(d)
     }
 }
 
-/// All lanes by `f`, in a tree.
+/// The least and the greatest lane.
 #[inline(always)]
-fn reduce(mut lanes: [f32; RAYS], f: impl Fn(f32, f32) -> f32) -> f32 {
-    for half in [8, 4, 2, 1] {
-        for i in 0..half {
-            lanes[i] = f(lanes[i], lanes[i + half]);
-        }
-    }
-    lanes[0]
+fn range<I: Isa>(lanes: &[f32; RAYS]) -> (f32, f32) {
+    let half = |at: usize| I::Eight::load(lanes[at..at + 8].try_into().expect("8 of 16"));
+    let (mut least, mut most) = ([0.0; 8], [0.0; 8]);
+    half(0).min(half(8)).store(&mut least);
+    half(0).max(half(8)).store(&mut most);
+    let lesser = |a: f32, b: f32| if a < b { a } else { b };
+    let greater = |a: f32, b: f32| if a > b { a } else { b };
+    let pairs =
+        |v: &[f32; 8], f: fn(f32, f32) -> f32| f(f(f(v[0], v[4]), f(v[1], v[5])), f(f(v[2], v[6]), f(v[3], v[7])));
+    (pairs(&least, lesser), pairs(&most, greater))
 }
 
 /// A triangle that rays cross.
@@ -193,7 +200,7 @@ impl<'a, I: Isa> Search<'a, I> {
         for lane in bits(may) {
             self.triangle(lane, first + lane as u32, met);
         }
-        self.end = reduce(self.ends, |a, b| if a > b { a } else { b });
+        self.end = range::<I>(&self.ends).1;
     }
 
     /// The triangle in a lane of the rows against the rays `met`.
