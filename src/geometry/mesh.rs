@@ -5,9 +5,10 @@
 //! edge changes exactly their sign, so the two neighbours of an edge agree about the side on which a ray passes; a ray on the
 //! edge meets both. Everything before that, in f32 and for many triangles at once, is conservative.
 
-use super::bvh::{Bvh8, Node, WIDTH};
-use super::planes::{Block, Directions, Extent, Planes, splat};
-use super::simd::{Isa, Kernel, Path, Vector};
+use super::bvh::Bvh8;
+use super::planes::Block;
+use super::ray::{Any, Closest};
+use super::simd::Path;
 use super::{Hit, Ray, hit};
 use crate::math::{DVec3, Vec3};
 use smallvec::SmallVec;
@@ -144,46 +145,6 @@ impl Mesh {
     }
 }
 
-/// A ray in f32 on its way through the boxes.
-struct BoxRay<I: Isa> {
-    origin: [I::Eight; 3],
-    inverse: [I::Eight; 3],
-}
-
-impl<I: Isa> BoxRay<I> {
-    #[inline(always)]
-    fn new(origin: Vec3, direction: Vec3) -> Self {
-        BoxRay { origin: splat::<I>(origin.to_array()), inverse: splat::<I>((1.0 / direction).to_array()) }
-    }
-
-    /// The boxes of `node` that the ray meets before `end`, and when.
-    #[inline(always)]
-    fn meets(&self, node: &Node, end: f32) -> (u32, [f32; WIDTH]) {
-        let (mut enter, mut leave) = (I::Eight::splat(0.0), I::Eight::splat(end));
-        for axis in 0..3 {
-            let low = I::Eight::load(&node.low[axis]).sub(self.origin[axis]).mul(self.inverse[axis]);
-            let high = I::Eight::load(&node.high[axis]).sub(self.origin[axis]).mul(self.inverse[axis]);
-            enter = low.min(high).max(enter);
-            leave = low.max(high).min(leave);
-        }
-        let mut times = [0.0; WIDTH];
-        enter.store(&mut times);
-        (!leave.less(enter.mul(I::Eight::splat(1.0 - 1e-6))) & node.boxes, times)
-    }
-}
-
-/// The triangles of box `slot` of `node` that the ray from `origin` along `direction` may cross.
-#[inline(always)]
-fn candidates<I: Isa>(mesh: &Mesh, node: &Node, slot: usize, origin: Vec3, direction: Vec3) -> (usize, u32) {
-    let (apex, d) = (origin.to_array(), direction.to_array());
-    let extent = Extent::new(apex, node, slot);
-    let number = node.child[slot];
-    let block = &mesh.blocks[number as usize];
-    let planes = Planes::<I>::new(block, apex, extent, &Directions::new(d, d), mesh.floor);
-    let there = (1u32 << node.triangles[slot]) - 1;
-    (mesh.bvh.firsts[number as usize] as usize, planes.along(d) & there)
-}
-
 /// The numbers of the bits that are set.
 #[inline(always)]
 pub(super) fn bits(mask: u32) -> Bits {
@@ -210,54 +171,6 @@ impl Iterator for Bits {
 /// Nodes that wait for a ray; memory is asked for only in hierarchies of unusual depth.
 pub(super) type Stack<T> = SmallVec<[T; 96]>;
 
-/// The nearest triangle along a ray: distance and place.
-struct Closest<'a> {
-    mesh: &'a Mesh,
-    origin: Vec3,
-    direction: Vec3,
-}
-
-impl Kernel for Closest<'_> {
-    type Output = Option<(f64, u32)>;
-
-    #[inline(always)]
-    fn run<I: Isa>(self) -> Option<(f64, u32)> {
-        let Closest { mesh, origin, direction } = self;
-        let (o, d) = (origin.as_dvec3(), direction.as_dvec3());
-        let ray = BoxRay::<I>::new(origin, direction);
-        let mut best: Option<(f64, u32)> = None;
-        let mut place = 0;
-        // A box that begins at this very distance may hold a lower primitive number, hence the rounding up.
-        let mut end = f32::INFINITY;
-        let mut stack: Stack<(f32, u32)> = Stack::new();
-        if !mesh.is_empty() {
-            stack.push((0.0, 0));
-        }
-        while let Some((time, number)) = stack.pop() {
-            if time > end {
-                continue;
-            }
-            let node = &mesh.bvh.nodes[number as usize];
-            let (met, times) = ray.meets(node, end);
-            for slot in bits(met & node.blocks) {
-                let (first, may) = candidates::<I>(mesh, node, slot, origin, direction);
-                for lane in bits(may) {
-                    let triangle = &mesh.triangles[first + lane];
-                    let limit = best.map_or(f64::INFINITY, |(t, _)| t);
-                    let Some(t) = triangle.intersect(o, d, limit) else { continue };
-                    if best.is_none_or(|b| (t, triangle.primitive) < b) {
-                        best = Some((t, triangle.primitive));
-                        place = first + lane;
-                        end = (t * (1.0 + 1e-6)) as f32;
-                    }
-                }
-            }
-            push_sorted(&mut stack, bits(met & !node.blocks).map(|slot| (times[slot], node.child[slot])));
-        }
-        best.map(|(t, _)| (t, place as u32))
-    }
-}
-
 /// Pushes nodes, the nearest last.
 #[inline(always)]
 pub(super) fn push_sorted(stack: &mut Stack<(f32, u32)>, nodes: impl Iterator<Item = (f32, u32)>) {
@@ -269,40 +182,6 @@ pub(super) fn push_sorted(stack: &mut Stack<(f32, u32)>, nodes: impl Iterator<It
             stack.swap(at - 1, at);
             at -= 1;
         }
-    }
-}
-
-/// Whether any triangle crosses a segment.
-struct Any<'a> {
-    mesh: &'a Mesh,
-    origin: Vec3,
-    direction: Vec3,
-}
-
-impl Kernel for Any<'_> {
-    type Output = bool;
-
-    #[inline(always)]
-    fn run<I: Isa>(self) -> bool {
-        let Any { mesh, origin, direction } = self;
-        let (o, d) = (origin.as_dvec3(), direction.as_dvec3());
-        let ray = BoxRay::<I>::new(origin, direction);
-        let mut stack: Stack<u32> = Stack::new();
-        if !mesh.is_empty() {
-            stack.push(0);
-        }
-        while let Some(number) = stack.pop() {
-            let node = &mesh.bvh.nodes[number as usize];
-            let (met, _) = ray.meets(node, 1.0);
-            for slot in bits(met & node.blocks) {
-                let (first, may) = candidates::<I>(mesh, node, slot, origin, direction);
-                if bits(may).any(|lane| mesh.triangles[first + lane].crosses(o, d)) {
-                    return true;
-                }
-            }
-            stack.extend(bits(met & !node.blocks).map(|slot| node.child[slot]));
-        }
-        false
     }
 }
 

@@ -16,6 +16,7 @@ mod packet;
 mod plane;
 mod planes;
 mod proximity;
+mod ray;
 mod shaft;
 pub mod simd;
 mod sphere;

@@ -29,11 +29,11 @@ use super::simd::{Isa, Vector};
 use crate::math::Vec3;
 
 /// Half the distance between 1 and the next f32.
-const U: f32 = 1.0 / (1 << 24) as f32;
+pub(super) const U: f32 = 1.0 / (1 << 24) as f32;
 /// Tolerance of the edges in units of u M L S.
 const EDGE: f32 = 48.0 * U;
 /// Tolerance of the face in units of |a| + |d|.
-const FACE: f32 = 5.1 * U;
+pub(super) const FACE: f32 = 5.1 * U;
 /// What f64 itself rounds: 28 2^-53 M^2 S.
 const EDGE_F64: f32 = U * U;
 /// Keeps tolerances above what underflow loses.
@@ -43,9 +43,9 @@ const TINY: f32 = 1e-36;
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
 pub(super) struct Block {
-    corners: [[[f32; WIDTH]; 3]; 3],
+    pub(super) corners: [[[f32; WIDTH]; 3]; 3],
     /// Unit normals, the cross products of f64 rounded; 0 for a triangle without area.
-    normal: [[f32; WIDTH]; 3],
+    pub(super) normal: [[f32; WIDTH]; 3],
 }
 
 impl Block {
@@ -191,19 +191,6 @@ impl<I: Isa> Planes<I> {
         miss |= middle.add(spread).less(self.volume.sub(tolerance));
         cover &= self.volume.add(tolerance).less(middle.sub(spread));
         Against { may: !miss | self.doubtful, cover: cover & !self.doubtful }
-    }
-
-    /// The triangles that the ray along `d`, of any length, may cross.
-    #[inline(always)]
-    pub(super) fn along(&self, d: [f32; 3]) -> u32 {
-        let d = splat::<I>(d);
-        let negative = I::Eight::splat(-self.edge_tolerance);
-        let mut miss = 0;
-        for edge in &self.edges {
-            miss |= dot::<I>(*edge, d).less(negative);
-        }
-        miss |= dot::<I>(self.face, d).less(I::Eight::splat(-self.face_tolerance));
-        !miss | self.doubtful
     }
 
     /// The triangles that some ray in a box of directions, of any length, may cross.
