@@ -5,13 +5,13 @@
 //! edge changes exactly their sign, so the two neighbours of an edge agree about the side on which a ray passes; a ray on the
 //! edge meets both. Everything before that, in f32 and for many triangles at once, is conservative.
 
-use super::bvh::Bvh8;
+use super::bvh::{Bvh8, WIDTH};
 use super::planes::Block;
 use super::ray::{Any, Closest};
 use super::simd::Path;
 use super::{Hit, Ray, hit};
 use crate::math::{DVec3, Vec3};
-use smallvec::SmallVec;
+use arrayvec::ArrayVec;
 
 /// Triangles and their hierarchy.
 pub struct Mesh {
@@ -92,7 +92,12 @@ impl Mesh {
     }
 
     pub(super) fn triangle(&self, primitive: u32) -> [DVec3; 3] {
-        self.triangles[self.place[primitive as usize] as usize].corners.map(|p| p.as_dvec3())
+        self.triangles[self.place(primitive) as usize].corners.map(|p| p.as_dvec3())
+    }
+
+    /// Where a primitive stands in the order of the blocks.
+    pub(super) fn place(&self, primitive: u32) -> u32 {
+        self.place[primitive as usize]
     }
 
     /// Parameters at which the line o + t d, t in 0 ..= `end`, enters and leaves the mesh; `None` when it misses it.
@@ -124,11 +129,7 @@ impl Mesh {
     }
 
     fn closest_hit_near(&self, ray: &Ray) -> Option<Hit> {
-        // Boxes and triangles must see the same ray, or a ray could pass between a box and its triangle.
-        let (origin, direction) = (ray.origin.as_vec3(), ray.direction.as_vec3());
-        let (distance, place) = self.path.run(Closest { mesh: self, origin, direction })?;
-        let triangle = &self.triangles[place as usize];
-        Some(triangle.face().hit(ray, distance, triangle.primitive))
+        self.path.run(Closest { mesh: self, ray })
     }
 
     /// True when a triangle crosses the segment from `a` to `b`, ends excluded.
@@ -168,54 +169,102 @@ impl Iterator for Bits {
     }
 }
 
-/// Nodes that wait for a ray; memory is asked for only in hierarchies of unusual depth.
-pub(super) type Stack<T> = SmallVec<[T; 96]>;
+/// Boxes that wait for rays, by when they are entered.
+#[derive(Default)]
+pub(super) struct Open {
+    /// The bits of the time, which is not negative, above the node and the slot: one number to compare and to keep.
+    keys: ArrayVec<u64, 96>,
+    /// Those below, in hierarchies of unusual depth.
+    below: Vec<u64>,
+}
 
-/// Pushes nodes, the nearest last.
-#[inline(always)]
-pub(super) fn push_sorted(stack: &mut Stack<(f32, u32)>, nodes: impl Iterator<Item = (f32, u32)>) {
-    let bottom = stack.len();
-    for node in nodes {
-        stack.push(node);
-        let mut at = stack.len() - 1;
-        while at > bottom && stack[at - 1].0 < node.0 {
-            stack.swap(at - 1, at);
-            at -= 1;
+impl Open {
+    /// Adds the boxes `met` of the node `number`, the nearest last.
+    #[inline(always)]
+    pub(super) fn push(&mut self, number: u32, met: u32, times: &[f32; WIDTH]) {
+        if self.keys.remaining_capacity() < WIDTH {
+            self.make_room();
+        }
+        let bottom = self.keys.len();
+        for slot in bits(met) {
+            let key = u64::from(times[slot].to_bits()) << 32 | u64::from(number * WIDTH as u32 + slot as u32);
+            let mut at = self.keys.len();
+            self.keys.push(key);
+            while at > bottom && self.keys[at - 1] < key {
+                self.keys[at] = self.keys[at - 1];
+                at -= 1;
+            }
+            self.keys[at] = key;
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn make_room(&mut self) {
+        self.below.extend(self.keys.drain(..));
+    }
+
+    /// The time, node and slot of the box on top that is entered before `end`; it and all above it are taken off.
+    #[inline(always)]
+    pub(super) fn pop(&mut self, end: f32) -> Option<(f32, usize, usize)> {
+        loop {
+            let key = match self.keys.pop() {
+                Some(key) => key,
+                None => self.below.pop()?,
+            };
+            let (time, at) = (f32::from_bits((key >> 32) as u32), key as u32 as usize);
+            if time <= end {
+                return Some((time, at / WIDTH, at % WIDTH));
+            }
         }
     }
 }
 
-/// The plane of a triangle, by a corner \[m\] and the unit normal.
+/// The plane of a triangle for rays from one point.
 pub(super) struct Face {
     corner: DVec3,
+    /// N, of the length of twice the area.
     normal: DVec3,
+    /// N . (corner - origin): a ray along d meets the plane at its quotient by N . d.
+    numerator: f64,
 }
 
 impl Face {
-    /// The hit of `ray` at `distance` on this face of `primitive`.
     #[inline(always)]
-    pub(super) fn hit(&self, ray: &Ray, distance: f64, primitive: u32) -> Hit {
+    pub(super) fn distance(&self, d: DVec3) -> f64 {
+        self.numerator / self.normal.dot(d)
+    }
+
+    /// The unit normal.
+    #[inline(always)]
+    pub(super) fn unit(&self) -> DVec3 {
+        // What `normalize` computes; its square root is an instruction of old, slow between those of wide vectors.
+        self.normal * (1.0 / self.normal.dot(self.normal).sqrt())
+    }
+
+    /// The hit of `ray` at `distance` on this face of `primitive`, with unit normal `unit`.
+    #[inline(always)]
+    pub(super) fn hit(&self, ray: &Ray, distance: f64, primitive: u32, unit: DVec3) -> Hit {
         let near = ray.origin + distance * ray.direction;
-        let position = near - self.normal.dot(near - self.corner) * self.normal;
-        Hit { primitive, ..hit(ray, distance, position, self.normal) }
+        let position = near - unit.dot(near - self.corner) * unit;
+        Hit { primitive, ..hit(ray, distance, position, unit) }
     }
 }
 
 impl Triangle {
+    /// Its plane for rays from `o`.
     #[inline(always)]
-    pub(super) fn face(&self) -> Face {
+    pub(super) fn face(&self, o: DVec3) -> Face {
         let [a, b, c] = self.corners.map(|p| p.as_dvec3());
         let normal = (b - a).cross(c - a);
-        // What `normalize` computes; its square root is an instruction of old, slow between those of wide vectors.
-        Face { corner: a, normal: normal * (1.0 / normal.dot(normal).sqrt()) }
+        Face { corner: a, normal, numerator: normal.dot(a) - normal.dot(o) }
     }
 
     /// Parameter 0 < t <= limit at which the line o + t d crosses the triangle, edges included.
     #[inline(always)]
     pub(super) fn intersect(&self, o: DVec3, d: DVec3, limit: f64) -> Option<f64> {
         let [a, b, c] = self.corners.map(|p| p.as_dvec3());
-        let (normal, numerator) = self.plane_from(o);
-        let t = numerator / normal.dot(d);
+        let t = self.face(o).distance(d);
         // Edge-on the quotient is infinite or undefined: a triangle seen edge-on is not there.
         if !(t > 0.0 && t <= limit && t.is_finite()) {
             return None;
@@ -224,14 +273,6 @@ impl Triangle {
         let edges = [d.dot(c.cross(b)), d.dot(a.cross(c)), d.dot(b.cross(a))];
         let one_side = edges.iter().all(|&e| e >= 0.0) || edges.iter().all(|&e| e <= 0.0);
         one_side.then_some(t)
-    }
-
-    /// N, of the length of twice the area, and N . (A - `o`): rays along d from `o` meet the plane at their quotient by N . d.
-    #[inline(always)]
-    pub(super) fn plane_from(&self, o: DVec3) -> (DVec3, f64) {
-        let [a, b, c] = self.corners.map(|p| p.as_dvec3());
-        let normal = (b - a).cross(c - a);
-        (normal, normal.dot(a) - normal.dot(o))
     }
 
     /// True when the segment from `o` along `d` crosses the triangle, edges included and ends excluded.

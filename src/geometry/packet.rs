@@ -13,7 +13,7 @@
 //! triangles that are left, mostly one, the nearest is found in f64, by the formula that single rays use.
 
 use super::bvh::{Node, WIDTH};
-use super::mesh::{Mesh, Stack, bits, push_sorted};
+use super::mesh::{Mesh, Open, bits};
 use super::planes::{Extent, Planes, Rows};
 use super::shaft::{Bundle, Shaft};
 use super::simd::{Isa, Kernel, Vector};
@@ -122,8 +122,7 @@ struct Candidate {
 struct Work {
     rows: Rows,
     candidates: SmallVec<[Candidate; 8]>,
-    /// Boxes by node and slot, and when the first ray enters them \[m\].
-    open: Stack<(f32, u32)>,
+    open: Open,
 }
 
 /// A packet on its way through the hierarchy.
@@ -163,14 +162,10 @@ impl<'a, I: Isa> Search<'a, I> {
                 let (met, enter) = self.shaft.meets_before::<I>(node, self.end);
                 let mut times = [0.0; WIDTH];
                 enter.store(&mut times);
-                let boxes = bits(met).map(|slot| (times[slot], number * WIDTH as u32 + slot as u32));
-                push_sorted(&mut self.work.open, boxes);
+                self.work.open.push(number, met, &times);
             }
-            let Some((time, at)) = self.work.open.pop() else { return self.finish(rays, hits) };
-            if time > self.end {
-                continue;
-            }
-            let (node, slot) = (&self.mesh.bvh.nodes[at as usize / WIDTH], at as usize % WIDTH);
+            let Some((_, number, slot)) = self.work.open.pop(self.end) else { return self.finish(rays, hits) };
+            let node = &self.mesh.bvh.nodes[number];
             let met = self.bundle.meets_before(node, slot, self.apex, I::Sixteen::load(&self.ends)) & ALL;
             if met == 0 {
                 continue;
@@ -262,13 +257,13 @@ impl<'a, I: Isa> Search<'a, I> {
                 continue;
             }
             let triangle = &self.mesh.triangles[candidate.place as usize];
-            let (normal, numerator) = triangle.plane_from(origin);
-            let face = triangle.face();
+            let face = triangle.face(origin);
+            let unit = face.unit();
             for lane in bits(lanes) {
-                let t = numerator / normal.dot(self.direction(lane));
+                let t = face.distance(self.direction(lane));
                 if (t, triangle.primitive) < best[lane] {
                     best[lane] = (t, triangle.primitive);
-                    hits[lane] = Some(face.hit(&rays[lane], t, triangle.primitive));
+                    hits[lane] = Some(face.hit(&rays[lane], t, triangle.primitive, unit));
                 }
             }
         }

@@ -292,7 +292,7 @@ fn along<I: Isa>(normals: &[[f32; WIDTH]; 3], lane: usize, d: &[I::Sixteen; 3]) 
 }
 
 #[inline(always)]
-fn load<I: Isa>(rows: &[[f32; WIDTH]; 3]) -> [I::Eight; 3] {
+pub(super) fn load<I: Isa>(rows: &[[f32; WIDTH]; 3]) -> [I::Eight; 3] {
     [I::Eight::load(&rows[0]), I::Eight::load(&rows[1]), I::Eight::load(&rows[2])]
 }
 
@@ -308,7 +308,7 @@ fn add<I: Isa>(a: [I::Eight; 3], b: [I::Eight; 3]) -> [I::Eight; 3] {
 }
 
 #[inline(always)]
-fn sub<I: Isa>(a: [I::Eight; 3], b: [I::Eight; 3]) -> [I::Eight; 3] {
+pub(super) fn sub<I: Isa>(a: [I::Eight; 3], b: [I::Eight; 3]) -> [I::Eight; 3] {
     [a[0].sub(b[0]), a[1].sub(b[1]), a[2].sub(b[2])]
 }
 
@@ -323,7 +323,7 @@ fn turn<I: Isa>(a: [I::Eight; 3], sign: I::Eight) -> [I::Eight; 3] {
 }
 
 #[inline(always)]
-fn dot<I: Isa>(a: [I::Eight; 3], b: [I::Eight; 3]) -> I::Eight {
+pub(super) fn dot<I: Isa>(a: [I::Eight; 3], b: [I::Eight; 3]) -> I::Eight {
     a[0].mul_add(b[0], a[1].mul_add(b[1], a[2].mul(b[2])))
 }
 

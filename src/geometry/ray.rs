@@ -1,7 +1,7 @@
 //! Single rays through the mesh: the closest triangle, and whether any is met.
 //!
-//! A ray asks eight boxes at once, and goes into the nearest first; then eight triangles at once, sheared so that it runs along
-//! an axis z: with (x, y) the corners seen from there, the areas of the three triangles between the ray and each edge,
+//! A ray asks eight boxes at once, and goes into the nearest first; then eight triangles at once. With (x, y) the corners across
+//! the ray, in the frame of two unit vectors at right angles to it, the areas of the triangles between the ray and each edge,
 //!
 //! ```text
 //! U = c_x b_y - c_y b_x,   V = a_x c_y - a_y c_x,   W = b_x a_y - b_y a_x
@@ -12,19 +12,25 @@
 //! passes an edge too closely.
 //!
 //! With u = 2^-24, M an upper bound of how far the corners are, L the longest side of the box around them, and the ray within L/2
-//! of this box (boxes are inflated more than their test rounds): |x| and |y| are at most 3 L, their errors 4 u M + 3 u L
-//! (1 of the corner, 2 of the shear, 1 where it is not fused), and those of the areas 12 L times that and 36 u L^2 more. The
-//! errors of N . a and N . d are those in [`super::planes`].
+//! of this box (boxes are inflated more than their test rounds), |x| and |y| are at most 2.3 L. Their errors are at most 14 u M: 1
+//! of the corner, 6 of the scalar product, 6 because the frame is rounded and the ray not quite at right angles to it, 1 to spare.
+//! Those of the areas are 4 x 2.3 L times that, and 4 u (2.3 L)^2 for their own rounding: 130 u M L + 24 u L^2. The errors of N . a and
+//! N . d are those in [`super::planes`].
 
 use super::bvh::{Node, WIDTH};
-use super::mesh::{Mesh, Stack, bits, push_sorted};
-use super::planes::{Block, FACE, U, splat};
+use super::mesh::{Face, Mesh, Open, bits};
+use super::planes::{Block, FACE, U, dot, load, splat, sub};
 use super::simd::{Isa, Kernel, Vector};
+use super::{Hit, Ray};
 use crate::math::{DVec3, Vec3};
+use arrayvec::ArrayVec;
 use smallvec::SmallVec;
 
 /// Stands for 0 where one divides by a coordinate of a direction: far below what boxes are inflated by.
 const NIL: f32 = 1e-20;
+
+/// Tolerance of the areas in units of u M L.
+const ACROSS: f32 = 130.0;
 
 /// A ray in f32 on its way through the boxes.
 struct BoxRay<I: Isa> {
@@ -38,7 +44,7 @@ struct BoxRay<I: Isa> {
 impl<I: Isa> BoxRay<I> {
     #[inline(always)]
     fn new(origin: Vec3, direction: Vec3) -> Self {
-        let inverse = |d: f32| if d.abs() < NIL { (1.0 / NIL).copysign(d) } else { 1.0 / d };
+        let inverse = |d: f32| 1.0 / (if d.abs() > NIL { d.abs() } else { NIL }).copysign(d);
         let inverse = [inverse(direction.x), inverse(direction.y), inverse(direction.z)];
         let shift = [origin.x * inverse[0], origin.y * inverse[1], origin.z * inverse[2]];
         let falls = [inverse[0] < 0.0, inverse[1] < 0.0, inverse[2] < 0.0];
@@ -70,51 +76,56 @@ struct Meeting {
     late: [f32; WIDTH],
 }
 
-/// A ray in f32 on its way through the triangles; its axes are in the order x, y, z of the sheared space.
+/// A ray in f32 on its way through the triangles.
 struct Sight<I: Isa> {
-    axes: [usize; 3],
     origin: [I::Eight; 3],
     direction: [I::Eight; 3],
-    shear: [I::Eight; 2],
+    /// Two unit vectors across the direction.
+    across: [[I::Eight; 3]; 2],
     /// |d|, a little more.
     length: f32,
     floor: f32,
 }
 
 impl<I: Isa> Sight<I> {
+    /// Along a direction that is `length` long.
     #[inline(always)]
-    fn new(origin: Vec3, direction: Vec3, floor: f32) -> Self {
-        let size = direction.abs();
-        let z = if size.x > size.y && size.x > size.z { 0 } else { 1 + usize::from(size.z > size.y) };
-        let axes = [(z + 1) % 3, (z + 2) % 3, z];
-        let ordered = |v: Vec3| [v[axes[0]], v[axes[1]], v[axes[2]]];
-        let (o, d) = (ordered(origin), ordered(direction));
-        let shear = [I::Eight::splat(d[0] / d[2]), I::Eight::splat(d[1] / d[2])];
-        let length = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt() * (1.0 + 8.0 * U);
-        Sight { axes, origin: splat::<I>(o), direction: splat::<I>(d), shear, length, floor }
+    fn new(origin: Vec3, direction: Vec3, length: f32, floor: f32) -> Self {
+        let Vec3 { x, y, z } = direction / length;
+        // The frame of Duff et al. 2017.
+        let sign = 1f32.copysign(z);
+        let a = -1.0 / (sign + z);
+        let b = x * y * a;
+        let across = [[1.0 + sign * x * x * a, sign * b, -sign * x], [b, sign + y * y * a, -y]];
+        Sight {
+            origin: splat::<I>(origin.to_array()),
+            direction: splat::<I>(direction.to_array()),
+            across: [splat::<I>(across[0]), splat::<I>(across[1])],
+            length: length * (1.0 + 8.0 * U),
+            floor,
+        }
     }
 
     /// Box `slot` of `node`, which the ray enters at `time`.
     #[inline(always)]
     fn meets(&self, block: &Block, node: &Node, slot: usize, time: f32) -> Option<Meeting> {
         let side = |axis: usize| node.high[axis][slot] - node.low[axis][slot];
-        let edge = side(0).max(side(1)).max(side(2));
+        let greater = |a: f32, b: f32| if a > b { a } else { b };
+        let edge = greater(greater(side(0), side(1)), side(2));
         let far = time * self.length + 2.0 * edge;
         let [a, b, c] = [self.seen(block, 0), self.seen(block, 1), self.seen(block, 2)];
         let [u, v, w] = [area::<I>(&c, &b), area::<I>(&a, &c), area::<I>(&b, &a)];
         let (least, most) = (u.min(v).min(w), u.max(v).max(w));
-        let tolerance = (48.0 * far + 72.0 * edge) * edge * U;
+        let tolerance = (ACROSS * far + 24.0 * edge) * edge * U;
         let (above, below) = (I::Eight::splat(tolerance), I::Eight::splat(-tolerance));
         let outside = least.less(below) & above.less(most);
         let there = (1u32 << node.triangles[slot]) - 1;
         if !outside & there == 0 {
             return None;
         }
-        let normal = |k: usize| I::Eight::load(&block.normal[self.axes[k]]);
-        let normal = [normal(0), normal(1), normal(2)];
-        let dot = |v: &[I::Eight; 3]| normal[0].mul_add(v[0], normal[1].mul_add(v[1], normal[2].mul(v[2])));
-        let volume = dot(&a.from);
-        let toward = dot(&self.direction).flip(volume);
+        let normal = load::<I>(&block.normal);
+        let volume = dot::<I>(normal, a.from);
+        let toward = dot::<I>(normal, self.direction).flip(volume);
         let volume = volume.abs();
         let face = I::Eight::splat(FACE * far + self.floor);
         let slope = I::Eight::splat(FACE * self.length);
@@ -133,11 +144,8 @@ impl<I: Isa> Sight<I> {
 
     #[inline(always)]
     fn seen(&self, block: &Block, corner: usize) -> Corner<I> {
-        let rows = &block.corners[corner];
-        let from = |k: usize| I::Eight::load(&rows[self.axes[k]]).sub(self.origin[k]);
-        let from = [from(0), from(1), from(2)];
-        let sheared = |k: usize| from[k].sub(self.shear[k].mul(from[2]));
-        Corner { x: sheared(0), y: sheared(1), from }
+        let from = sub::<I>(load::<I>(&block.corners[corner]), self.origin);
+        Corner { x: dot::<I>(from, self.across[0]), y: dot::<I>(from, self.across[1]), from }
     }
 }
 
@@ -153,35 +161,32 @@ fn area<I: Isa>(p: &Corner<I>, q: &Corner<I>) -> I::Eight {
     p.x.mul_sub(q.y, p.y.mul(q.x))
 }
 
-/// The nearest triangle along a ray: distance and place.
+/// The first triangle along a ray that starts near the mesh.
 pub(super) struct Closest<'a> {
     pub(super) mesh: &'a Mesh,
-    pub(super) origin: Vec3,
-    pub(super) direction: Vec3,
+    pub(super) ray: &'a Ray,
 }
 
 impl Kernel for Closest<'_> {
-    type Output = Option<(f64, u32)>;
+    type Output = Option<Hit>;
 
     #[inline(always)]
-    fn run<I: Isa>(self) -> Option<(f64, u32)> {
-        let Closest { mesh, origin, direction } = self;
+    fn run<I: Isa>(self) -> Option<Hit> {
+        let Closest { mesh, ray } = self;
+        // Boxes and triangles must see the same ray, or it could pass between a box and its triangle.
+        let (origin, direction) = (ray.origin.as_vec3(), ray.direction.as_vec3());
         let (o, d) = (origin.as_dvec3(), direction.as_dvec3());
-        let (ray, sight) = (BoxRay::<I>::new(origin, direction), Sight::<I>::new(origin, direction, mesh.floor));
-        let mut candidates = Candidates { crossed: SmallVec::new(), end: f32::INFINITY };
-        // Boxes by node and slot.
-        let mut open: Stack<(f32, u32)> = Stack::new();
+        let (boxes, sight) = (BoxRay::<I>::new(origin, direction), Sight::<I>::new(origin, direction, 1.0, mesh.floor));
+        let mut candidates = Candidates { crossed: ArrayVec::new(), end: f32::INFINITY };
+        let mut open = Open::default();
         let mut next = if mesh.is_empty() { None } else { Some(0) };
         loop {
             if let Some(number) = next.take() {
-                let (met, times) = ray.meets(&mesh.bvh.nodes[number as usize], candidates.end);
-                push_sorted(&mut open, bits(met).map(|slot| (times[slot], number * WIDTH as u32 + slot as u32)));
+                let (met, times) = boxes.meets(&mesh.bvh.nodes[number as usize], candidates.end);
+                open.push(number, met, &times);
             }
-            let Some((time, at)) = open.pop() else { return candidates.nearest(mesh, o, d) };
-            if time > candidates.end {
-                continue;
-            }
-            let (node, slot) = (&mesh.bvh.nodes[at as usize / WIDTH], at as usize % WIDTH);
+            let Some((time, number, slot)) = open.pop(candidates.end) else { break };
+            let node = &mesh.bvh.nodes[number];
             let child = node.child[slot];
             if node.blocks >> slot & 1 == 0 {
                 next = Some(child);
@@ -189,13 +194,15 @@ impl Kernel for Closest<'_> {
                 candidates.add(mesh, mesh.bvh.firsts[child as usize], &meeting, o, d);
             }
         }
+        let (t, primitive, face) = candidates.nearest(mesh, o, d)?;
+        Some(face.hit(ray, t, primitive, face.unit()))
     }
 }
 
 /// Triangles that a ray crosses.
 struct Candidates {
     /// Lower bounds of the distance, and places.
-    crossed: SmallVec<[(f32, u32); 16]>,
+    crossed: ArrayVec<(f32, u32), 16>,
     /// An upper bound of the distance of the nearest.
     end: f32,
 }
@@ -214,27 +221,39 @@ impl Candidates {
                 },
             };
             if early <= self.end {
-                self.end = self.end.min(late);
+                self.end = if late < self.end { late } else { self.end };
+                if self.crossed.is_full() {
+                    self.decide(mesh, o, d);
+                }
                 self.crossed.push((early, place));
             }
         }
     }
 
-    /// Distance and place of the nearest, the lower primitive of equals.
+    /// Keeps the nearest alone.
+    #[cold]
+    #[inline(never)]
+    fn decide(&mut self, mesh: &Mesh, o: DVec3, d: DVec3) {
+        let nearest = self.nearest(mesh, o, d).map(|(t, primitive, _)| ((t * (1.0 - 1e-6)) as f32, mesh.place(primitive)));
+        self.crossed.clear();
+        self.crossed.extend(nearest);
+    }
+
+    /// Distance, primitive and plane of the nearest, the lower primitive of equals.
     #[inline(always)]
-    fn nearest(&self, mesh: &Mesh, o: DVec3, d: DVec3) -> Option<(f64, u32)> {
-        let mut best: Option<(f64, u32, u32)> = None;
+    fn nearest(&self, mesh: &Mesh, o: DVec3, d: DVec3) -> Option<(f64, u32, Face)> {
+        let mut best: Option<(f64, u32, Face)> = None;
         for &(early, place) in &self.crossed {
             if early <= self.end {
                 let triangle = &mesh.triangles[place as usize];
-                let (normal, numerator) = triangle.plane_from(o);
-                let t = numerator / normal.dot(d);
-                if best.is_none_or(|(least, primitive, _)| (t, triangle.primitive) < (least, primitive)) {
-                    best = Some((t, triangle.primitive, place));
+                let face = triangle.face(o);
+                let t = face.distance(d);
+                if best.as_ref().is_none_or(|&(least, primitive, _)| (t, triangle.primitive) < (least, primitive)) {
+                    best = Some((t, triangle.primitive, face));
                 }
             }
         }
-        best.map(|(t, _, place)| (t, place))
+        best
     }
 }
 
@@ -252,8 +271,9 @@ impl Kernel for Any<'_> {
     fn run<I: Isa>(self) -> bool {
         let Any { mesh, origin, direction } = self;
         let (o, d) = (origin.as_dvec3(), direction.as_dvec3());
-        let (ray, sight) = (BoxRay::<I>::new(origin, direction), Sight::<I>::new(origin, direction, mesh.floor));
-        let mut open: Stack<u32> = Stack::new();
+        let length = direction.dot(direction).sqrt();
+        let (ray, sight) = (BoxRay::<I>::new(origin, direction), Sight::<I>::new(origin, direction, length, mesh.floor));
+        let mut open: SmallVec<[u32; 96]> = SmallVec::new();
         if !mesh.is_empty() {
             open.push(0);
         }
