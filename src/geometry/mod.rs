@@ -12,9 +12,11 @@
 mod bvh;
 mod mesh;
 mod ordering;
+mod packet;
 mod plane;
 mod planes;
 mod proximity;
+mod ray;
 mod shaft;
 pub mod simd;
 mod sphere;
@@ -108,7 +110,24 @@ impl Geometry {
 
     /// The first surface along `ray`; equal distances go to the lower primitive number.
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-        let mut best = self.mesh.closest_hit(ray);
+        let best = self.mesh.closest_hit(ray);
+        if self.spheres.is_empty() && self.planes.is_empty() { best } else { self.closest_of_all(ray, best) }
+    }
+
+    /// What [`Geometry::closest_hit`] gives for each of `rays`, to `hits`, of the same length. Rays from one point go
+    /// several times faster in this way, where 16 that follow each other point in nearly the same direction.
+    pub fn closest_hits(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        assert_eq!(rays.len(), hits.len(), "a hit for each ray");
+        self.mesh.closest_hits(rays, hits);
+        if !self.spheres.is_empty() || !self.planes.is_empty() {
+            for (ray, hit) in rays.iter().zip(hits) {
+                *hit = self.closest_of_all(ray, *hit);
+            }
+        }
+    }
+
+    /// The first surface along `ray`, which meets the triangles at `best`.
+    fn closest_of_all(&self, ray: &Ray, mut best: Option<Hit>) -> Option<Hit> {
         let mut number = self.mesh.len() as u32;
         let mut offer = |found: Option<Hit>| {
             if let Some(hit) = found

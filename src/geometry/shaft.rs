@@ -28,11 +28,16 @@ impl Shaft {
     /// From `apex` to the box between `low` and `high` \[m\].
     #[inline(always)]
     pub(super) fn new(apex: [f32; 3], low: [f32; 3], high: [f32; 3]) -> Self {
-        let (mut least, mut most) = ([0.0; 3], [0.0; 3]);
+        // Rounding is monotonic: every d of the bundle, rounded in the same way, lies between these.
+        let way = |to: [f32; 3]| [to[0] - apex[0], to[1] - apex[1], to[2] - apex[2]];
+        Shaft::along(apex, way(low), way(high))
+    }
+
+    /// From `apex` along every d between `least` and `most`.
+    #[inline(always)]
+    pub(super) fn along(apex: [f32; 3], least: [f32; 3], most: [f32; 3]) -> Self {
         let (mut enter, mut leave, mut stay) = ([[0.0; 3]; 2], [[0.0; 3]; 2], [[f32::INFINITY; 3]; 2]);
         for axis in 0..3 {
-            // Rounding is monotonic: every d of the bundle, rounded in the same way, lies between these.
-            (least[axis], most[axis]) = (low[axis] - apex[axis], high[axis] - apex[axis]);
             enter[0][axis] = 1.0 / most[axis].max(NIL);
             enter[1][axis] = 1.0 / least[axis].min(-NIL);
             if least[axis] > NIL {
@@ -48,7 +53,13 @@ impl Shaft {
     /// The children of `node` whose boxes some segment may meet.
     #[inline(always)]
     pub(super) fn meets<I: Isa>(&self, node: &Node) -> u32 {
-        let (mut enter, mut leave) = (I::Eight::splat(0.0), I::Eight::splat(1.0));
+        self.meets_before::<I>(node, 1.0).0
+    }
+
+    /// The children of `node` whose boxes some ray, 0 <= t <= `end`, may meet, and when the first of them does.
+    #[inline(always)]
+    pub(super) fn meets_before<I: Isa>(&self, node: &Node, end: f32) -> (u32, I::Eight) {
+        let (mut enter, mut leave) = (I::Eight::splat(0.0), I::Eight::splat(end));
         for axis in 0..3 {
             let apex = I::Eight::splat(self.apex[axis]);
             let low = I::Eight::load(&node.low[axis]).sub(apex);
@@ -60,7 +71,7 @@ impl Shaft {
             leave = leave.min(high.mul_add(leave_high, stay_high).min(low.mul_add(leave_low, stay_low)));
         }
         let miss = leave.less(enter.mul(I::Eight::splat(EARLIER)));
-        !miss & node.boxes
+        (!miss & node.boxes, enter)
     }
 }
 
@@ -88,8 +99,14 @@ impl<I: Isa> Bundle<I> {
     /// from what is in the box than rounding is.
     #[inline(always)]
     pub(super) fn meets(&self, node: &Node, slot: usize, apex: [f32; 3]) -> u32 {
+        self.meets_before(node, slot, apex, I::Sixteen::splat(1.0))
+    }
+
+    /// The same for rays that end at `ends`.
+    #[inline(always)]
+    pub(super) fn meets_before(&self, node: &Node, slot: usize, apex: [f32; 3], ends: I::Sixteen) -> u32 {
         debug_assert!(slot < WIDTH);
-        let (mut enter, mut leave) = (I::Sixteen::splat(0.0), I::Sixteen::splat(1.0));
+        let (mut enter, mut leave) = (I::Sixteen::splat(0.0), ends);
         for axis in 0..3 {
             let low = self.inverse[axis].mul(I::Sixteen::splat(node.low[axis][slot] - apex[axis]));
             let high = self.inverse[axis].mul(I::Sixteen::splat(node.high[axis][slot] - apex[axis]));

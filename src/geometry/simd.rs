@@ -42,10 +42,17 @@ impl Path {
     }
 
     /// True when this processor has the instructions.
+    #[inline]
     pub fn is_available(self) -> bool {
+        // The standard library keeps what it detected, but asks for each of ten instructions.
+        static AVAILABLE: OnceLock<[bool; 3]> = OnceLock::new();
+        AVAILABLE.get_or_init(|| Path::ALL.map(Path::detect))[self as usize]
+    }
+
+    fn detect(self) -> bool {
         match self {
             Path::Avx512 => {
-                Path::Avx2.is_available()
+                Path::Avx2.detect()
                     && is_x86_feature_detected!("avx512f")
                     && is_x86_feature_detected!("avx512bw")
                     && is_x86_feature_detected!("avx512dq")
@@ -90,8 +97,7 @@ impl Path {
     #[inline]
     pub fn run<K: Kernel>(self, kernel: K) -> K::Output {
         match self {
-            // SAFETY: the assertions say that the processor has the instructions. The detection is kept by the
-            // standard library: asking again costs a load.
+            // SAFETY: the assertions say that the processor has the instructions; asking again costs a load.
             Path::Avx512 => {
                 assert!(self.is_available(), "no AVX-512 here");
                 unsafe { run_avx512(kernel) }

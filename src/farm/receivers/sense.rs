@@ -40,14 +40,8 @@ impl ReceiverSet {
     /// The points of emitters that all receivers of the set share in `batch`, for each position in a bin.
     pub fn lit_points(&self, scene: &Scene, batch: u64) -> Vec<Connectors> {
         let positions = u64::from(self.positions());
-        let mut sets = Vec::new();
-        let count = ((self.histories as f64 * crate::math::knob("SHARED", 1.0)) as u64 / positions)
-            .max(1)
-            .next_power_of_two() as u32;
-        for position in 0..positions {
-            sets.push(self.lit_points_of(scene, batch, position, count));
-        }
-        sets
+        let count = (self.histories / (HISTORIES_OF_A_POINT * positions)).max(1).next_power_of_two() as u32;
+        (0..positions).map(|position| self.lit_points_of(scene, batch, position, count)).collect()
     }
 
     /// The points of emitters that the points of continuations share in `batch`: a run for each of `groups` paths.
