@@ -1,11 +1,12 @@
 #!/bin/bash
-# Tests that need programs beside the Rust toolchain: the EXR maps in OpenEXR's and OpenImageIO's own tools.
+# Tests that need programs beside the Rust toolchain: the EXR maps in OpenEXR's and OpenImageIO's own tools, and the same bits on
+# an old processor in qemu.
 # Installs what is missing (Debian); a tool that cannot be had is a failure.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-packages=(openexr openimageio-tools)
-tools=(exrheader exrinfo oiiotool iinfo)
+packages=(openexr openimageio-tools qemu-user)
+tools=(exrheader exrinfo oiiotool iinfo qemu-x86_64)
 
 missing=()
 for package in "${packages[@]}"; do
@@ -23,5 +24,6 @@ done
 cargo build --release --locked
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
-target/release/lampyris run -q scripts/external/room.toml -o "$folder"
-scripts/external/check_exr.py "$folder"
+target/release/lampyris run -q scripts/external/room.toml -o "$folder/room"
+scripts/external/check_exr.py "$folder/room"
+scripts/external/paths.sh target/release/lampyris "$folder"

@@ -9,6 +9,7 @@ use lampyris::farm::merge::{goal_reached, merge};
 use lampyris::farm::plan::{Plan, human};
 use lampyris::farm::status::{Status, status};
 use lampyris::farm::worker::{self, Order};
+use lampyris::geometry::simd;
 use lampyris::report;
 use lampyris::validate::{self, Found};
 use std::fs::OpenOptions;
@@ -46,6 +47,8 @@ pub enum Exit {
 /// # Errors
 /// Whatever stops it.
 pub fn execute(command: Command) -> Result<Outcome> {
+    // Asked for instructions that are not there, nothing is computed with others.
+    simd::Path::chosen()?;
     match command {
         Command::Run { job, output, workers, quiet } => run(&job, output, Options { workers, quiet }),
         Command::Plan { job, output } => plan(&job, output),

@@ -346,6 +346,20 @@ fn a_fault_that_names_no_step_is_refused() {
 }
 
 #[test]
+fn instructions_that_are_not_there_are_refused() {
+    let folder = folder_with(JOB);
+    for (name, code) in [("avx1024", 2), ("", 2), ("scalar", 0)] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_lampyris"));
+        command.current_dir(folder.path()).args(["plan", "job.toml"]).env("LAMPYRIS_SIMD", name);
+        let output = command.output().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(code), "{name}: {said}");
+        let wrong = format!("LAMPYRIS_SIMD = {name}: what this processor has: ");
+        assert!(code == 0 || said.contains(&wrong) && said.contains("scalar"), "{said}");
+    }
+}
+
+#[test]
 fn regions_and_ratios_are_checked_as_all_else() {
     let good = "[[region]]\nname = \"wall\"\ncamera = \"view\"\nrectangle = [1, 1, 2, 2]\n\
                 [[ratio]]\nname = \"part\"\nnumerator = \"wall\"\ndenominator = \"floor\"\n\

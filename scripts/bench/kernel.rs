@@ -3,8 +3,11 @@
 //! The workload of `segments.rs`: 8 vertices against the 512 x 512 points that a camera sees, each segment from the vertex
 //! to a point where both cosines are positive; beside it closest hits along the flights of trajectories. Every path that the
 //! processor has is measured, the paths in turn, and must find the same segments blocked. Times are CPU time of the thread.
+//!
+//! `cargo bench --bench kernel -- leaks` looks for segments that leave closed surfaces instead.
 
 mod common;
+mod leaks;
 mod segments;
 
 use common::thread_time;
@@ -14,6 +17,7 @@ use lampyris::geometry::{Geometry, Mesh, Ray, kd_order};
 use lampyris::math::Vec3;
 use lampyris::tally::statistics;
 use segments::{Place, Scene, Segments};
+use std::time::Duration;
 
 const RUNS: usize = 7;
 const VERTICES: usize = 8;
@@ -21,6 +25,9 @@ const SIDE: u32 = 512;
 
 fn main() {
     let wanted: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
+    if wanted.contains(&"leaks".to_string()) {
+        return leaks::search();
+    }
     for scene in Scene::ALL {
         if wanted.is_empty() || wanted.contains(&scene.letter().to_string()) {
             bench(scene);
@@ -63,7 +70,7 @@ fn bench(scene: Scene) {
             for (vertex, seen) in segments.vertices.iter().zip(&mut seen) {
                 path.run(Shadow { geometry: &geometry, apex: vertex.point, tiles: &tiles, seen });
             }
-            rates[k].push(traced as f64 / (thread_time() - start).as_secs_f64() / 1e6);
+            rates[k].push(rate(traced, thread_time() - start));
             blocked.push(traced - seen.iter().map(|lanes| count(lanes)).sum::<u64>());
             hits[k].push(closest_hits(&geometry, &segments));
         }
@@ -118,5 +125,10 @@ fn closest_hits(geometry: &Geometry, segments: &Segments) -> f64 {
         geometry.closest_hit(&ray).is_some()
     });
     std::hint::black_box(met.count());
-    flights.len() as f64 / (thread_time() - start).as_secs_f64() / 1e6
+    rate(flights.len() as u64, thread_time() - start)
+}
+
+/// Millions a second.
+fn rate(count: u64, time: Duration) -> f64 {
+    count as f64 / time.as_secs_f64() / 1e6
 }

@@ -13,6 +13,10 @@ use super::{Hit, Ray, hit};
 use crate::math::{DVec3, Vec3};
 use arrayvec::ArrayVec;
 
+/// How far from a triangle's box f64 may see a crossing, in units of the largest coordinate of a corner seen from the start
+/// of the ray: far more than f64 rounds, a quarter of what the boxes of the hierarchy are inflated by.
+const AROUND: f64 = 4.0 / (1u64 << 24) as f64;
+
 /// Triangles and their hierarchy.
 pub struct Mesh {
     /// In the order of the blocks.
@@ -252,6 +256,11 @@ impl Face {
 }
 
 impl Triangle {
+    #[cfg(test)]
+    pub(super) fn new(corners: [Vec3; 3]) -> Self {
+        Triangle { corners, primitive: 0 }
+    }
+
     /// Its plane for rays from `o`.
     #[inline(always)]
     pub(super) fn face(&self, o: DVec3) -> Face {
@@ -261,6 +270,10 @@ impl Triangle {
     }
 
     /// Parameter 0 < t <= limit at which the line o + t d crosses the triangle, edges included.
+    ///
+    /// A line in the triangle's very plane has only roundings for t and for sides, and could seem to cross anywhere. So the
+    /// crossing must lie in the box around the triangle, give or take [`AROUND`]: then no test of a box, which is
+    /// inflated by more, can contradict, and the answer is the same by whatever way through the hierarchy.
     #[inline(always)]
     pub(super) fn intersect(&self, o: DVec3, d: DVec3, limit: f64) -> Option<f64> {
         let [a, b, c] = self.corners.map(|p| p.as_dvec3());
@@ -272,7 +285,12 @@ impl Triangle {
         let (a, b, c) = (a - o, b - o, c - o);
         let edges = [d.dot(c.cross(b)), d.dot(a.cross(c)), d.dot(b.cross(a))];
         let one_side = edges.iter().all(|&e| e >= 0.0) || edges.iter().all(|&e| e <= 0.0);
-        one_side.then_some(t)
+        if !one_side {
+            return None;
+        }
+        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+        let (at, around) = (t * d, AROUND * low.abs().max(high.abs()).max_element());
+        (at.cmpge(low - around).all() && at.cmple(high + around).all()).then_some(t)
     }
 
     /// True when the segment from `o` along `d` crosses the triangle, edges included and ends excluded.

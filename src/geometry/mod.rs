@@ -148,11 +148,6 @@ impl Geometry {
         self.path().run(Hide { geometry: self, apex, points, seen, scratch });
     }
 
-    /// The first surface along each of `rays`.
-    pub fn closest_hits(&self, rays: &[Ray]) -> Vec<Option<Hit>> {
-        rays.iter().map(|ray| self.closest_hit(ray)).collect()
-    }
-
     /// How far points of bounded geometry are lifted \[m\]: thinner things cannot cast a shadow on what touches them.
     pub fn lift_length(&self) -> f64 {
         LIFT * self.extent

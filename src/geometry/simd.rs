@@ -561,3 +561,6 @@ impl<const N: usize> Vector for Plain<N> {
         Plain(lanes)
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -132,7 +132,9 @@ impl ReceiverSet {
         let draw = |(&bin, rng): (&u32, &mut Generator)| eye.gaze(self.draw(eye, stratum, bin as usize, rng));
         let gazes: Vec<Gaze> = bins.iter().zip(&mut *rngs).map(draw).collect();
         let rays: Vec<Ray> = gazes.iter().filter_map(gaze_ray).collect();
-        let mut hits = scene.geometry.closest_hits(&rays).into_iter();
+        let mut hits = vec![None; rays.len()];
+        scene.geometry.closest_hits(&rays, &mut hits);
+        let mut hits = hits.into_iter();
         let mut see = |(gaze, rng): (&Gaze, &mut Generator)| {
             let (hit, direction) = match gaze {
                 Gaze::Along(ray) => (hits.next().flatten(), ray.direction),
