@@ -15,6 +15,7 @@ mod ordering;
 mod packet;
 mod plane;
 mod planes;
+mod points;
 mod proximity;
 mod ray;
 mod shaft;

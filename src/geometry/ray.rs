@@ -234,7 +234,8 @@ impl Candidates {
     #[cold]
     #[inline(never)]
     fn decide(&mut self, mesh: &Mesh, o: DVec3, d: DVec3) {
-        let nearest = self.nearest(mesh, o, d).map(|(t, primitive, _)| ((t * (1.0 - 1e-6)) as f32, mesh.place(primitive)));
+        let nearest =
+            self.nearest(mesh, o, d).map(|(t, primitive, _)| ((t * (1.0 - 1e-6)) as f32, mesh.place(primitive)));
         self.crossed.clear();
         self.crossed.extend(nearest);
     }
@@ -272,7 +273,8 @@ impl Kernel for Any<'_> {
         let Any { mesh, origin, direction } = self;
         let (o, d) = (origin.as_dvec3(), direction.as_dvec3());
         let length = direction.dot(direction).sqrt();
-        let (ray, sight) = (BoxRay::<I>::new(origin, direction), Sight::<I>::new(origin, direction, length, mesh.floor));
+        let (ray, sight) =
+            (BoxRay::<I>::new(origin, direction), Sight::<I>::new(origin, direction, length, mesh.floor));
         let mut open: SmallVec<[u32; 96]> = SmallVec::new();
         if !mesh.is_empty() {
             open.push(0);

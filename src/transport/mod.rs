@@ -39,6 +39,7 @@
 //! Transport does not know files, threads, shards, how many histories run, nor the shape of a picture.
 
 pub mod connection;
+mod connectors;
 pub mod continuation;
 pub mod crossing;
 pub mod direct;
@@ -47,4 +48,5 @@ pub mod receiver;
 pub mod reverse;
 pub mod shared;
 mod spherical_triangle;
+mod totals;
 pub mod trajectory;

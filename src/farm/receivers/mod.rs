@@ -16,7 +16,7 @@ mod reverse;
 
 use crate::error::{Error, Result};
 use crate::geometry::Ray;
-use crate::job::{Camera, Grid, Job, Point, SetShape};
+use crate::job::{Camera, Grid, Job, Point, Sampling, SetShape};
 use crate::math::{DVec2, DVec3};
 use crate::photometry::Colour;
 use crate::random::sobol::PointSet;
@@ -39,6 +39,8 @@ pub struct ReceiverSet {
     /// Of the directions in which they start.
     directions: Stream,
     histories: u64,
+    /// Whether the job asks for quasi-random histories: continuations follow.
+    quasi_random: bool,
     /// b of the bounded kernel \[1/m2\]; infinite where nothing is bounded.
     bound: f64,
     /// Where each bin lies, of a surface point seen from all directions; empty for others.
@@ -56,8 +58,8 @@ enum Bins {
 /// Draws after which a bin across the horizon is taken to show nothing of what lies above.
 const DRAWS: u32 = 1 << 16;
 
-/// Random numbers of the paths that continue one bin in one batch: where their number is a power of two, they start
-/// with the points of a scrambled quasi-random set, so that their directions do not leave a part of the hemisphere out.
+/// Random numbers of the paths that continue one bin in one batch: in a quasi-random job, where their number is a power of two,
+/// they start with the points of a scrambled quasi-random set, so that their directions do not leave a part of the hemisphere out.
 pub struct Paths {
     rng: Generator,
     points: Option<PointSet>,
@@ -107,6 +109,7 @@ impl ReceiverSet {
         let continuations = Stream::new(job.run.seed, Domain::Continuation, &shape.name);
         let directions = Stream::new(job.run.seed, Domain::Direction, &shape.name);
         let histories = job.run.histories_per_batch;
+        let quasi_random = job.run.sampling == Sampling::Rqmc;
         let mut set = ReceiverSet {
             shape,
             bins,
@@ -115,6 +118,7 @@ impl ReceiverSet {
             continuations,
             directions,
             histories,
+            quasi_random,
             bound,
             sights: Vec::new(),
         };
@@ -137,7 +141,8 @@ impl ReceiverSet {
     /// The paths that continue bin `bin` in a batch, `count` in number.
     pub fn continuations(&self, bin: u32, batch: u64, count: usize) -> Paths {
         let index = batch * self.shape.bins() as u64 + u64::from(bin);
-        let points = count.is_power_of_two().then(|| PointSet::new(&self.directions, index, count.ilog2()));
+        let points = (self.quasi_random && count.is_power_of_two())
+            .then(|| PointSet::new(&self.directions, index, count.ilog2()));
         Paths { rng: self.continuations.generator(index), points, next: 0 }
     }
 

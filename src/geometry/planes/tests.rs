@@ -92,8 +92,7 @@ impl Kernel for Judge {
         let ray = [I::Sixteen::splat(d.x), I::Sixteen::splat(d.y), I::Sixteen::splat(d.z)];
         let single = rows.test::<I>(0, &ray);
         let against = planes.against(&directions);
-        let (hit, miss) =
-            (single.hit | against.cover & 1, single.miss | !against.may & 1 | !planes.along(d.into()) & 1);
+        let (hit, miss) = (single.hit | against.cover & 1, single.miss | !against.may & 1);
         let crosses = Triangle::new(corners).crosses(apex.as_dvec3(), d.as_dvec3());
         let contradicted = if crosses { miss & 1 == 1 } else { hit & 1 == 1 };
         (errors::<I>(&self.0, &rows, &ray), contradicted)
