@@ -9,6 +9,8 @@
 //! point on an infinite plane lies farther out. That is a few roundings of an f32 coordinate; the distance, cosines
 //! and geometric factor of a connection use the points themselves.
 
+#![allow(clippy::needless_range_loop, reason = "several arrays go by one axis, lane or channel")]
+
 mod bvh;
 mod mesh;
 mod ordering;

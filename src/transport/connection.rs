@@ -14,6 +14,8 @@
 //! scores do not depend on by whom tiles are computed. Numbers come from plain f32 operations without contraction, which give the
 //! same bits whatever the width of the vectors they are compiled to; see [`crate::geometry::simd`].
 
+#![allow(clippy::needless_range_loop, reason = "several arrays go by one axis, lane or channel")]
+
 use super::connectors::Connector;
 use super::receiver::Receiver;
 use super::totals::{Column, Sums, Totals};

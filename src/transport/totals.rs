@@ -1,5 +1,7 @@
 //! What histories give the links of a tile: in f32 over the vertices of one history, in f64 over histories.
 
+#![allow(clippy::needless_range_loop, reason = "several arrays go by one axis, lane or channel")]
+
 use super::connection::{Connected, TILE, Tile};
 use crate::geometry::visibility::{BUNDLE, BUNDLES};
 use crate::photometry::Colour;

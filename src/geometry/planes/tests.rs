@@ -54,7 +54,7 @@ impl Case {
         vector[axis] = match n.below(3) {
             0 => f32::from_bits(vector[axis].to_bits() ^ (n.bits() & ((1 << step) - 1))),
             1 => vector[axis] * (1.0 + 0.1 * n.signed()),
-            _ => vector[axis] + n.signed() * 2f32.powi(-(step as i32)),
+            _ => vector[axis] + n.signed() * f32::from_bits((127 - step as u32) << 23),
         };
         self
     }
