@@ -1,0 +1,44 @@
+"""Errors against a reference that has an error of its own, and figures of merit."""
+
+import numpy as np
+
+
+class Reference:
+    """The mean of two programs' long runs, weighted by their mean relative variances: one weight a program, since
+    weights by bin would prefer values that came out low. Bins without a positive value count in nothing."""
+
+    def __init__(self, ours, theirs):
+        first, second = ours.values, theirs.values
+        self.bins = np.isfinite(first) & (first > 0) & (second > 0)
+        between = np.where(self.bins, (first + second) / 2, 1.0)
+        relative = [np.mean((v / between**2)[self.bins]) for v in (ours.variance, theirs.variance)]
+        share = relative[1] / (relative[0] + relative[1])
+        self.share = share
+        self.values = share * first + (1 - share) * second
+        self.variance = share**2 * ours.variance + (1 - share) ** 2 * theirs.variance
+        deviation = np.sqrt(ours.variance + theirs.variance)
+        certain = self.bins & (deviation > 1e-6 * between)
+        self.z = ((first - second)[certain]) / deviation[certain]
+        self.of_totals = np.sum(first[self.bins]) / np.sum(second[self.bins]) - 1
+        self.of_totals_error = np.sqrt(np.sum(theirs.variance[self.bins])) / np.sum(second[self.bins])
+        self.own = np.mean((self.variance / between**2)[self.bins])
+
+    def deviations(self, values):
+        return ((values - self.values) / np.where(self.bins, self.values, 1.0))[self.bins]
+
+    def squared_error(self, values, chosen=None):
+        """Mean squared relative error, that of the reference taken off; over the chosen bins."""
+        within = self.bins if chosen is None else self.bins & chosen
+        relative = np.where(self.bins, (values - self.values) ** 2 - self.variance, 0.0) / np.where(self.bins, self.values, 1.0) ** 2
+        return np.mean(relative[within])
+
+    def repeated_error(self, runs):
+        """Root mean square of the relative error that all runs have in common: the bias, of runs that are independent."""
+        deviations = [self.deviations(values) for values in runs]
+        products = [np.mean(a * b) for i, a in enumerate(deviations) for b in deviations[:i]]
+        return np.sqrt(max(0.0, np.mean(products) - self.own)) if products else np.nan
+
+
+def figure_of_merit(squared_error, seconds):
+    """1/(mean squared relative error x CPU seconds) [1/s]; not a number where the reference is no better than the run."""
+    return 1 / (squared_error * seconds) if squared_error > 0 and seconds > 0 else np.nan
