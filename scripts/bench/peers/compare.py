@@ -1,7 +1,8 @@
 """Measures Lampyris, Mitsuba and Radiance on the same scenes and writes docs/peers.md; started by `run`.
 
     run [--quick | --long] [--lampyris BINARY] [--no-report]     the comparison
-    run --sweep [PROGRAM ...]                                    looks for the best settings, writes docs/peers-sweep.csv
+    run --sweep [PROGRAM ...]                                    adds to docs/peers-sweep.csv what it has not, and finds
+                                                                 the best settings of the programs named anew
 
 Every program runs on one core, in turn, with another seed each time; medians count. References are kept in
 target/peers/references, for the binary of Lampyris that made them.
@@ -38,7 +39,7 @@ def main():
     length = LENGTHS["quick" if arguments.quick else "long" if arguments.long else "short"]
     references = {(s.name, k): reference(programs, s, k, length.reference) for s, k in tasks}
     if arguments.sweep is not None:
-        sweep(programs, tasks, references, arguments.sweep or PROGRAMS)
+        sweep(programs, tasks, references, arguments.sweep)
         return
     runs = measure_all(programs, tasks, length)
     text = report.text(programs, tasks, references, runs, length, arguments)
@@ -86,15 +87,18 @@ def measure_all(programs, tasks, length):
     return runs
 
 
-def sweep(programs, tasks, references, names):
-    """Figures of merit of all candidates, added to the record; those of other programs stay in it."""
+def sweep(programs, tasks, references, again):
+    """Figures of merit of all candidates that the record has not; those of the programs named are all found again."""
     rows = []
     if SWEEP.exists():
         with SWEEP.open() as file:
-            rows = [row for row in csv.DictReader(file) if row["program"] not in names]
-    for scene, kind in tasks:
-        for name in names:
+            rows = [row for row in csv.DictReader(file) if row["program"] not in again]
+    known = {(row["program"], row["scene"], row["kind"], row["setting"]) for row in rows}
+    for name in PROGRAMS:
+        for scene, kind in tasks:
             for setting in CANDIDATES[name, kind]:
+                if (name, scene.name, kind, describe(setting)) in known:
+                    continue
                 rows.append(try_candidate(programs[name], name, scene, kind, setting, references[scene.name, kind]))
                 say(" ".join(str(value) for value in rows[-1].values()))
                 store(rows)

@@ -55,9 +55,11 @@ class Grid:
 
     def __init__(self, name, setting):
         scene = scenes.load(name)
-        self.points, self.samples = scene.grid_points(), setting["samples"]
+        self.points = scene.grid_points()
         self.scene = mi.load_dict(describe(scene))
-        self.sampler = mi.load_dict({"type": setting["sampler"], "sample_count": self.samples})
+        self.sampler = mi.load_dict({"type": setting["sampler"], "sample_count": setting["samples"]})
+        # Some samplers take only counts of a certain form.
+        self.samples = self.sampler.sample_count()
         # Hidden lamps: what they send straight to the points is counted by sampling them.
         path = {"type": "path", "max_depth": -1, "rr_depth": setting["rr_depth"], "hide_emitters": True}
         self.path = mi.load_dict(path)

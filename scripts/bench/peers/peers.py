@@ -126,6 +126,7 @@ class Mitsuba:
         worker.stdin.flush()
         answer = worker.stdout.readline()
         if not answer:
+            del self.workers[setting["variant"]]
             raise process.Failed("Mitsuba ended")
         stored = np.load(result)
         return Result(stored["mean"], json.loads(answer)["seconds"], stored["variance"])

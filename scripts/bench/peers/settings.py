@@ -37,7 +37,7 @@ LENGTHS = {
     "short": Length(run=4.0, reference=25.0, repeats=3),
     "long": Length(run=20.0, reference=300.0, repeats=5),
 }
-SWEEP_SECONDS = 2.0
+SWEEP_SECONDS = 1.0
 
 
 def product(**choices):
@@ -85,10 +85,14 @@ CANDIDATES = {
         {"variant": "llvm_ad_mono", "sampler": "multijitter", "samples": 16, "rr_depth": 8},
         {"variant": "llvm_ad_rgb", "sampler": "multijitter", "samples": 16, "rr_depth": 5},
     ],
-    ("radiance", "grid"): rtrace(u=["+", "-"], ad=[64, 1024], lw=[1e-2, 1e-3, 1e-4]),
+    ("radiance", "grid"): [
+        *rtrace(u=["+", "-"], ad=[64], lw=[1e-2]),
+        *rtrace(u=["+", "-"], ad=[1024], lw=[1e-2, 1e-3]),
+        *rtrace(u=["+", "-"], ad=[4096], lw=[1e-2, 1e-3]),
+    ],
     ("radiance", "image"): rtrace(u=["+", "-"], ad=[1, 4, 16], lw=[1e-1, 1e-2]),
-    ("radiance-cache", "grid"): cached(ab=[6], aa=[0.1, 0.2], ad=[512, 2048], lw=[1e-2, 1e-3], **{"as": [0]}),
-    ("radiance-cache", "image"): cached(ab=[6], aa=[0.1, 0.2], ad=[256, 1024], lw=[1e-2], **{"as": [0, 64]}),
+    ("radiance-cache", "grid"): cached(ab=[6], aa=[0.1, 0.2], ad=[512, 2048], lw=[1e-2], **{"as": [0]}),
+    ("radiance-cache", "image"): cached(ab=[6], aa=[0.1, 0.2], ad=[256, 1024], lw=[1e-2], **{"as": [0]}),
 }
 
 
