@@ -1,8 +1,8 @@
 """Measures Lampyris, Mitsuba and Radiance on the same scenes and writes docs/peers.md; started by `run`.
 
     run [--quick | --long] [--lampyris BINARY] [--no-report]     the comparison
-    run --sweep [PROGRAM ...]                                    adds to docs/peers-sweep.csv what it has not, and finds
-                                                                 the best settings of the programs named anew
+    run --sweep [PROGRAM ...]                                    adds to docs/peers-sweep.csv what it has not; of the
+                                                                 programs named, everything anew
 
 Every program runs on one core, in turn, with another seed each time; medians count. References are kept in
 target/peers/references, for the binary of Lampyris that made them.
@@ -88,13 +88,13 @@ def measure_all(programs, tasks, length):
 
 
 def sweep(programs, tasks, references, again):
-    """Figures of merit of all candidates that the record has not; those of the programs named are all found again."""
+    """Figures of merit of all candidates that the record has not; with names, of these programs' all, and of no others."""
     rows = []
     if SWEEP.exists():
         with SWEEP.open() as file:
             rows = [row for row in csv.DictReader(file) if row["program"] not in again]
     known = {(row["program"], row["scene"], row["kind"], row["setting"]) for row in rows}
-    for name in PROGRAMS:
+    for name in again or PROGRAMS:
         for scene, kind in tasks:
             for setting in CANDIDATES[name, kind]:
                 if (name, scene.name, kind, describe(setting)) in known:

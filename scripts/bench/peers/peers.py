@@ -227,6 +227,12 @@ def bin_rays(scene, kind, generator):
     return points, np.broadcast_to(scenes.NORMAL, points.shape)
 
 
+def panel(triangles):
+    """The quadrilateral of two triangles: Radiance samples parallelograms exactly, triangles not."""
+    first, second = triangles
+    return [np.array([*first, second[2]])]
+
+
 def radiance_text(scene):
     lines = []
     for number, surface in enumerate(scene.surfaces):
@@ -234,9 +240,9 @@ def radiance_text(scene):
             lines.append(f"void light m{number} 0 0 3 {' '.join([repr(surface.luminance)] * 3)}")
         else:
             lines.append(f"void plastic m{number} 0 0 5 {' '.join([repr(surface.reflectance)] * 3)} 0 0")
-        for i, triangle in enumerate(surface.corners):
-            numbers = " ".join(f"{x:.9g}" for x in triangle.ravel())
-            lines.append(f"m{number} polygon p{number}.{i} 0 0 9 {numbers}")
+        for i, corners in enumerate(panel(surface.corners) if surface.luminance > 0 else surface.corners):
+            numbers = " ".join(f"{x:.9g}" for x in corners.ravel())
+            lines.append(f"m{number} polygon p{number}.{i} 0 0 {corners.size} {numbers}")
     if scene.lamp:
         position, intensity = scene.lamp
         radius = 1e-3

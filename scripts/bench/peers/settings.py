@@ -89,10 +89,15 @@ CANDIDATES = {
         *rtrace(u=["+", "-"], ad=[64], lw=[1e-2]),
         *rtrace(u=["+", "-"], ad=[1024], lw=[1e-2, 1e-3]),
         *rtrace(u=["+", "-"], ad=[4096], lw=[1e-2, 1e-3]),
+        *rtrace(u=["-"], ad=[256], lw=[1e-2], ds=[0.1, 0.03, 0.01]),
+        *rtrace(u=["-"], ad=[1024], lw=[1e-2, 1e-3], ds=[0.1, 0.03]),
     ],
-    ("radiance", "image"): rtrace(u=["+", "-"], ad=[1, 4, 16], lw=[1e-1, 1e-2]),
-    ("radiance-cache", "grid"): cached(ab=[6], aa=[0.1, 0.2], ad=[512, 2048], lw=[1e-2], **{"as": [0]}),
-    ("radiance-cache", "image"): cached(ab=[6], aa=[0.1, 0.2], ad=[256, 1024], lw=[1e-2], **{"as": [0]}),
+    ("radiance", "image"): [
+        *rtrace(u=["+", "-"], ad=[1, 4, 16], lw=[1e-1, 1e-2]),
+        *rtrace(u=["-"], ad=[4, 16], lw=[1e-1], ds=[0.1]),
+    ],
+    ("radiance-cache", "grid"): cached(ab=[6], aa=[0.2, 0.3], ad=[512, 2048], lw=[1e-2], **{"as": [0]}),
+    ("radiance-cache", "image"): cached(ab=[6], aa=[0.2, 0.3], ad=[256, 1024], lw=[1e-2], **{"as": [0]}),
 }
 
 
