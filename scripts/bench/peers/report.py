@@ -89,7 +89,8 @@ def foms(known, results, seconds, bins=None):
 def agreement(tasks, references):
     lines = ["## Do the references agree?\n"]
     lines.append("z is Lampyris less Mitsuba over their combined standard error, bin by bin; of equal expectations mean z2 is 1 and")
-    lines.append("|z| > 3 in 0.3 % of the bins. The reference is the mean of both, weighted by inverse variance.\n")
+    lines.append("|z| > 3 in 0.3 % of the bins, given some 30 batches or more. The reference is the mean of both, weighted by inverse")
+    lines.append("variance. The error of the ratio of sums is that of Mitsuba alone: bins of Lampyris share histories and err together.\n")
     lines.append("| task | bins | mean z2 | abs(z) > 3 | largest abs(z) | ratio of sums - 1 | weight of Lampyris | error of the reference |")
     lines.append("|---|---|---|---|---|---|---|---|")
     for scene, kind in tasks:
