@@ -49,7 +49,8 @@ def main():
 
 
 def parse_arguments():
-    parser = argparse.ArgumentParser(prog="run", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    form = argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser(prog="run", description=__doc__, formatter_class=form)
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--long", action="store_true")
     parser.add_argument("--lampyris", type=Path, default=ROOT / "target" / "release" / "lampyris")
@@ -88,7 +89,7 @@ def measure_all(programs, tasks, length):
 
 
 def sweep(programs, tasks, references, again):
-    """Figures of merit of all candidates that the record has not; with names, of these programs' all, and of no others."""
+    """Figures of merit of the candidates that the record has not; with names, of all of these programs alone."""
     rows = []
     if SWEEP.exists():
         with SWEEP.open() as file:

@@ -1,9 +1,9 @@
 """Mitsuba's `path` integrator in a process of its own: one request a line on standard input, as JSON.
 
 A request has scene, kind, setting, seconds, seed and a file for the result; the answer has the CPU seconds of the
-rendering. Images are rendered by Mitsuba's own sensor and film with a box filter. A grid is one wavefront of all points:
-light that arrives straight from the lamp by sampling the lamp, all other light by `path` along rays whose directions are
-distributed as the cosine. The first pass of each setting, in which kernels are compiled, is not counted.
+rendering. Images are rendered by Mitsuba's own sensor and film with a box filter. A grid is one wavefront of all
+points: light that arrives straight from the lamp by sampling the lamp, all other light by `path` along rays whose
+directions are distributed as the cosine. The first pass of each setting, which compiles kernels, is not counted.
 """
 
 import json
@@ -77,7 +77,8 @@ class Grid:
     def reflected(self):
         local = mi.warp.square_to_cosine_hemisphere(self.sampler.next_2d())
         frame = mi.Frame3f(mi.Normal3f(*scenes.NORMAL))
-        radiance, _, _ = self.path.sample(self.scene, self.sampler, mi.RayDifferential3f(mi.Ray3f(self.lanes, frame.to_world(local))))
+        rays = mi.RayDifferential3f(mi.Ray3f(self.lanes, frame.to_world(local)))
+        radiance, _, _ = self.path.sample(self.scene, self.sampler, rays)
         return mono(radiance)
 
     def straight(self, count):

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import process
 import scenes
-from settings import LEAST_BATCHES, ROOT, SIDE, TARGET
+from settings import LEAST_BATCHES, SIDE, TARGET
 
 
 @dataclass
@@ -28,8 +28,9 @@ class Result:
 
 
 class Lampyris:
-    """`plan`, `work` on one thread, `merge`. The rendering is `work` without what `work` takes for one lux-meter and a few
-    histories in the same scene: loading, building, writing. Planning, which follows pilot trajectories, counts in `whole`."""
+    """`plan`, `work` on one thread, `merge`. The rendering is `work` without what `work` takes for one lux-meter and a
+    few histories in the same scene: loading, building, writing. Planning, which follows pilot trajectories, counts in
+    `whole`."""
 
     def __init__(self, binary):
         self.binary, self.rates, self.loading = binary, {}, {}
@@ -80,9 +81,11 @@ def job_text(scene, kind, setting, batches, seed):
     if kind == "grid":
         lines = "".join(f"{key} = {list(value)}\n" for key, value in scenes.GRIDS[scene.name].items())
         side = SIDE["grid"]
-        return text + f'[[grid]]\nname = "grid"\n{lines}normal = {list(scenes.NORMAL)}\ncolumns = {side}\nrows = {side}\nkeep_batches = false\n'
+        text += f'[[grid]]\nname = "grid"\n{lines}normal = {list(scenes.NORMAL)}\n'
+        return text + f"columns = {side}\nrows = {side}\nkeep_batches = false\n"
     side, samples = SIDE["image"], setting["pixel_samples"]
-    return text + f'[[camera]]\nname = "image"\nnode = "camera"\nwidth = {side}\nheight = {side}\npixel_samples = {samples}\n'
+    text += f'[[camera]]\nname = "image"\nnode = "camera"\nwidth = {side}\nheight = {side}\n'
+    return text + f"pixel_samples = {samples}\n"
 
 
 def read_grid(path):
@@ -152,8 +155,8 @@ def llvm():
 
 
 class Radiance:
-    """rtrace on points of the grid (irradiance) or on rays through the pixels. Loading the octree is measured with one ray
-    and taken off. A point source is an `illum` sphere of 1 mm radius, which has the right intensity and is not seen."""
+    """rtrace on points of the grid (irradiance) or on rays through the pixels. Loading the octree is measured with one
+    ray and taken off. A point source is an `illum` sphere of 1 mm radius: the right intensity, and not seen."""
 
     def __init__(self, cached):
         import pyradiance
@@ -164,8 +167,8 @@ class Radiance:
         self.octrees, self.rates, self.loading, self.second = {}, {}, {}, 0
 
     def version(self):
-        text = subprocess.run([self.programs / "rtrace", "-version"], capture_output=True, text=True, env=self.environment)
-        return text.stdout.strip()
+        output, _ = process.run([self.programs / "rtrace", "-version"], environment=self.environment)
+        return output.decode().strip()
 
     def measure(self, scene, kind, setting, seconds, seed):
         key = json.dumps([scene.name, kind, setting])

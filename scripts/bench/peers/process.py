@@ -20,7 +20,7 @@ def run(command, given=b"", environment=None, directory=None):
     pipe = subprocess.PIPE
     child = subprocess.Popen(pinned, stdin=pipe, stdout=pipe, stderr=pipe, env=environment, cwd=directory)
     outputs = {}
-    readers = [threading.Thread(target=lambda s=s: outputs.update({s: getattr(child, s).read()})) for s in ("stdout", "stderr")]
+    readers = [threading.Thread(target=read, args=(child, name, outputs)) for name in ("stdout", "stderr")]
     writer = threading.Thread(target=feed, args=(child.stdin, given))
     limit = threading.Timer(PATIENCE, lambda: os.kill(child.pid, signal.SIGKILL))
     for thread in (*readers, writer, limit):
@@ -34,6 +34,10 @@ def run(command, given=b"", environment=None, directory=None):
         message = outputs["stderr"].decode(errors="replace").strip()[-500:]
         raise Failed(f"{command[0]} ended with {child.returncode}: {message}")
     return outputs["stdout"], usage.ru_utime + usage.ru_stime
+
+
+def read(child, name, outputs):
+    outputs[name] = getattr(child, name).read()
 
 
 def feed(pipe, given):

@@ -5,7 +5,6 @@ import subprocess
 import time
 
 import numpy as np
-import scenes
 from settings import PROGRAMS, REPORT, ROOT, SIDE, chosen, describe
 from statistic import figure_of_merit
 
@@ -15,26 +14,55 @@ TITLES = {
     "radiance": "Radiance, pure Monte Carlo",
     "radiance-cache": "Radiance, irradiance cache",
 }
-SCENE_TITLES = {"room": "room with column and omni", "cornell": "Cornell box, area light", "object": "room with 128k-triangle object"}
-KIND_TITLES = {"grid": f"{SIDE['grid']} x {SIDE['grid']} lux grid", "image": f"{SIDE['image']} x {SIDE['image']} luminance image"}
+SCENE_TITLES = {
+    "room": "room with column and omni",
+    "cornell": "Cornell box, area light",
+    "object": "room with 128k-triangle object",
+}
+KIND_TITLES = {
+    kind: f"{side} x {side} {what}" for (kind, side), what in zip(SIDE.items(), ("lux grid", "image"), strict=True)
+}
 # Points whose nearest face of the column is that far off [m] count as near.
 NEAR = 0.0065
 HEAD = """# Lampyris and other programs
 
-Written by `scripts/bench/peers/run`, which installs the others, measures and writes this page. The same scenes, one core
-each, in turn, with other random numbers in each of {repeats} repetitions; medians. The figure of merit is
-FOM = 1/(mean squared relative error x CPU seconds) [1/s], over all bins whose reference is above zero, the reference's own
-error taken off. CPU seconds are those of the rendering alone: of Lampyris, the worker process less what it takes to load
-the scene; "whole" counts planning with its pilot trajectories and loading too. Of Mitsuba, the process while it
-renders, after a first pass that compiles; of Radiance, `rtrace` less what it takes for one ray.
+Written by `scripts/bench/peers/run`, which installs the others, measures and writes this page. The same scenes, one
+core each, in turn, with other random numbers in each repetition, of which there are {repeats}; medians. The figure of
+merit is FOM = 1/(mean squared relative error x CPU seconds) [1/s], over all bins whose reference is above zero, the
+reference's own error taken off. CPU seconds are those of the rendering alone: of Lampyris, the worker process less what
+it takes to load the scene; "whole" counts planning with its pilot trajectories and loading too. Of Mitsuba, the process
+while it renders, after a first pass that compiles; of Radiance, `rtrace` less what it takes for one ray.
 
-Date: {date}, commit {commit}. Machine: {machine}. Versions: {versions}.
+Date: {date}, commit {commit}. Machine: {machine}.
+Versions: {versions}.
 Command: `{command}`; {seconds:g} s of CPU time a run, {reference:g} s a reference of each program.
 
-The Cornell box differs from `scenes/cornell.glb` in one thing: its panel does not reflect, because a `light` of Radiance
-cannot. Colours count by their luminance. The grids of the rooms pass 6 mm from all faces of the column, the grid of the
-Cornell box lies 1 mm over its floor.
+The Cornell box differs from `scenes/cornell.glb` in one thing: its panel does not reflect, because a `light` of
+Radiance cannot. Colours count by their luminance. The grids of the rooms pass 6 mm from all faces of the column, the
+grid of the Cornell box lies 1 mm over its floor. Images are of luminance.
 """
+AGREEMENT = """## Do the references agree?
+
+z is Lampyris less Mitsuba over their combined standard error, bin by bin; of equal expectations mean z2 is 1 and
+|z| > 3 in 0.3 % of the bins, given some 30 batches or more and errors that are near to normal. Those of Mitsuba's
+pixels are not: a rare bright path is missing in most of them, which then are too dark and seem too precise. So for
+images the sums over squares of 32 x 32 pixels are compared too: the root mean square of their relative difference,
+"of which" the error of Mitsuba explains the second figure; the rest is that of Lampyris, whose pixels share histories
+and err together. For the same reason the error of the ratio of sums is that of Mitsuba alone. The reference is the mean
+of both, weighted by inverse variance.
+
+| task | bins | mean z2 | abs(z) > 3 | largest | ratio of sums - 1 | squares | weight of Lampyris | error of the reference |
+|---|---|---|---|---|---|---|---|---|"""
+
+
+SETTINGS = """## Settings, errors and times
+
+Settings are the best of `docs/peers-sweep.csv` (`scripts/bench/peers/run --sweep`). The error is the root mean square
+of the relative error; what all repetitions have in common of it is the bias, within a tenth of the error. The cache of
+a grid has no random numbers, so that all its error is common. Empty: does not apply.
+
+| task | program | setting | error | in common | CPU [s] | CPU, whole [s] | worker's own [s] |
+|---|---|---|---|---|---|---|---|"""
 
 
 def text(programs, tasks, references, runs, length, arguments):
@@ -87,17 +115,13 @@ def foms(known, results, seconds, bins=None):
 
 
 def agreement(tasks, references):
-    lines = ["## Do the references agree?\n"]
-    lines.append("z is Lampyris less Mitsuba over their combined standard error, bin by bin; of equal expectations mean z2 is 1 and")
-    lines.append("|z| > 3 in 0.3 % of the bins, given some 30 batches or more. The reference is the mean of both, weighted by inverse")
-    lines.append("variance. The error of the ratio of sums is that of Mitsuba alone: bins of Lampyris share histories and err together.\n")
-    lines.append("| task | bins | mean z2 | abs(z) > 3 | largest abs(z) | ratio of sums - 1 | weight of Lampyris | error of the reference |")
-    lines.append("|---|---|---|---|---|---|---|---|")
+    lines = [AGREEMENT]
     for scene, kind in tasks:
         known = references[scene.name, kind]
-        z = known.z
-        cells = [f"{known.bins.sum()}", f"{np.mean(z * z):.2f}", f"{100 * np.mean(np.abs(z) > 3):.2f} %", f"{np.max(np.abs(z)):.1f}"]
+        z = np.abs(known.z)
+        cells = [f"{known.bins.sum()}", f"{np.mean(z * z):.2f}", f"{100 * np.mean(z > 3):.2f} %", f"{np.max(z):.1f}"]
         cells.append(f"{100 * known.of_totals:.3f} % +- {100 * known.of_totals_error:.3f} %")
+        cells.append(" of which ".join(f"{100 * x:.2f} %" for x in known.blocks) if known.blocks else "")
         cells += [f"{known.share:.3f}", f"{100 * np.sqrt(known.own):.3f} %"]
         lines.append(f"| {title(scene, kind)} | " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
@@ -118,17 +142,13 @@ def near_column(names, tasks, references, runs):
 
 def distance_to_column(points):
     """Horizontal distance [m] from the column of the room."""
-    outside = [np.maximum(np.maximum(low - x, x - high), 0) for x, low, high in ((points[:, 0], 3.9, 4.3), (points[:, 2], -2.8, -2.4))]
-    return np.hypot(*outside)
+    low, high = np.array([3.9, -2.8]), np.array([4.3, -2.4])
+    place = points[:, [0, 2]]
+    return np.hypot(*np.maximum(np.maximum(low - place, place - high), 0).T)
 
 
 def details(names, tasks, references, runs):
-    lines = ["## Settings, errors and times\n"]
-    lines.append("Settings are the best of `docs/peers-sweep.csv` (`scripts/bench/peers/run --sweep`). The error is the root mean square of")
-    lines.append("the relative error; what all repetitions have in common of it is the bias, within a tenth of the error. The cache of a grid")
-    lines.append("has no random numbers, so that all its error is common.\n")
-    lines.append("| task | program | setting | error | in common | CPU [s] | CPU, whole [s] | worker's own [s] |")
-    lines.append("|---|---|---|---|---|---|---|---|")
+    lines = [SETTINGS]
     for scene, kind in tasks:
         known = references[scene.name, kind]
         for name in names:
@@ -137,7 +157,8 @@ def details(names, tasks, references, runs):
             common = known.repeated_error([r.values for r in results])
             times = [middle_time(results, part) for part in ("seconds", "whole", "worker")]
             setting = f"`{describe(chosen(name, scene.name, kind))}`"
-            cells = [TITLES[name], setting, f"{100 * error:.3f} %", f"{100 * common:.3f} %", *times]
+            shared = f"{100 * common:.3f} %" if np.isfinite(common) else "-"
+            cells = [TITLES[name], setting, f"{100 * error:.3f} %", shared, *times]
             lines.append(f"| {title(scene, kind)} | " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 

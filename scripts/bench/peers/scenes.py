@@ -81,8 +81,8 @@ class Scene:
         """Cell centres [m], row by row, u fastest."""
         grid, side = GRIDS[self.name], SIDE["grid"]
         row, column = np.divmod(np.arange(side * side), side)
-        step = ((column + 0.5) / side)[:, None] * np.array(grid["u"]) + ((row + 0.5) / side)[:, None] * np.array(grid["v"])
-        return np.array(grid["origin"]) + step
+        along, across = ((x + 0.5)[:, None] / side for x in (column, row))
+        return np.array(grid["origin"]) + along * np.array(grid["u"]) + across * np.array(grid["v"])
 
 
 def make(name):
