@@ -41,6 +41,12 @@ The Cornell box differs from `scenes/cornell.glb` in one thing: its panel does n
 Radiance cannot. Colours count by their luminance. The grids of the rooms pass 6 mm from all faces of the column, the
 grid of the Cornell box lies 1 mm over its floor. Images are of luminance.
 """
+MERITS = """## Figures of merit [1/s]
+
+In brackets least and greatest of the repetitions. \\*: the reference is not twice as exact as the run, so that the
+figure depends on what is taken off for it, and may be wrong by a factor of two and more; see the last columns of the
+next table, or take `--long`.
+"""
 AGREEMENT = """## Do the references agree?
 
 z is Lampyris less Mitsuba over their combined standard error, bin by bin; of equal expectations mean z2 is 1 and
@@ -49,10 +55,12 @@ pixels are not: a rare bright path is missing in most of them, which then are to
 images the sums over squares of 32 x 32 pixels are compared too: the root mean square of their relative difference,
 "of which" the error of Mitsuba explains the second figure; the rest is that of Lampyris, whose pixels share histories
 and err together. For the same reason the error of the ratio of sums is that of Mitsuba alone. The reference is the mean
-of both, weighted by inverse variance.
+of both, weighted by inverse variance. The last columns are 1/(mean relative variance x CPU seconds) as the two programs
+themselves estimate their variances in these long runs: figures of merit that need no reference.
 
-| task | bins | mean z2 | abs(z) > 3 | largest | ratio of sums - 1 | squares | weight of Lampyris | error of the reference |
-|---|---|---|---|---|---|---|---|---|"""
+| task | bins | mean z2 | abs(z) > 3 | largest | ratio of sums - 1 | squares | weight of Lampyris | error of the reference \
+| FOM by its own errors: Lampyris | Mitsuba |
+|---|---|---|---|---|---|---|---|---|---|---|"""
 
 
 SETTINGS = """## Settings, errors and times
@@ -94,7 +102,7 @@ def output(*command):
 
 
 def merits(names, tasks, references, runs):
-    lines = ["## Figures of merit [1/s]\n", "In brackets least and greatest of the repetitions.\n"]
+    lines = [MERITS]
     titles = " | ".join(TITLES[name] for name in names)
     over = " | ".join(f"over {TITLES[name]}" for name in names[1:])
     lines.append(f"| task | {titles} | Lampyris, whole | {over} |")
@@ -104,7 +112,8 @@ def merits(names, tasks, references, runs):
         found = {name: foms(known, runs[name, scene.name, kind], lambda r: r.seconds) for name in names}
         whole = np.median(foms(known, runs["lampyris", scene.name, kind], lambda r: r.whole))
         middle = {name: np.median(values) for name, values in found.items()}
-        cells = [f"{number(middle[n])} ({number(min(found[n]))} .. {number(max(found[n]))})" for n in names]
+        marks = {n: "" if sure(known, runs[n, scene.name, kind]) else " \\*" for n in names}
+        cells = [f"{number(middle[n])}{marks[n]} ({number(min(found[n]))} .. {number(max(found[n]))})" for n in names]
         over = [number(middle["lampyris"] / middle[n]) for n in names[1:]]
         lines.append(f"| {title(scene, kind)} | " + " | ".join([*cells, number(whole), *over]) + " |")
     return "\n".join(lines) + "\n"
@@ -112,6 +121,10 @@ def merits(names, tasks, references, runs):
 
 def foms(known, results, seconds, bins=None):
     return [figure_of_merit(known.squared_error(r.values, bins), seconds(r)) for r in results]
+
+
+def sure(known, results):
+    return known.suffices(np.median([known.squared_error(r.values) for r in results]))
 
 
 def agreement(tasks, references):
@@ -122,7 +135,7 @@ def agreement(tasks, references):
         cells = [f"{known.bins.sum()}", f"{np.mean(z * z):.2f}", f"{100 * np.mean(z > 3):.2f} %", f"{np.max(z):.1f}"]
         cells.append(f"{100 * known.of_totals:.3f} % +- {100 * known.of_totals_error:.3f} %")
         cells.append(" of which ".join(f"{100 * x:.2f} %" for x in known.blocks) if known.blocks else "")
-        cells += [f"{known.share:.3f}", f"{100 * np.sqrt(known.own):.3f} %"]
+        cells += [f"{known.share:.3f}", f"{100 * np.sqrt(known.own):.3f} %", *map(number, known.claimed)]
         lines.append(f"| {title(scene, kind)} | " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 

@@ -15,6 +15,7 @@ class Reference:
         self.bins = np.isfinite(first) & (first > 0) & (second > 0)
         between = np.where(self.bins, (first + second) / 2, 1.0)
         relative = [np.mean((v / between**2)[self.bins]) for v in (ours.variance, theirs.variance)]
+        self.claimed = [figure_of_merit(r, run.seconds) for r, run in zip(relative, (ours, theirs), strict=True)]
         share = relative[1] / (relative[0] + relative[1])
         self.share = share
         self.values = share * first + (1 - share) * second
@@ -26,6 +27,10 @@ class Reference:
         self.of_totals_error = np.sqrt(np.sum(theirs.variance[self.bins])) / np.sum(second[self.bins])
         self.blocks = block_difference(first, second, theirs.variance)
         self.own = np.mean((self.variance / between**2)[self.bins])
+
+    def suffices(self, squared_error):
+        """Whether the reference's error is less than half that of a run: else what is taken off decides."""
+        return self.own < 0.25 * squared_error
 
     def deviations(self, values):
         return ((values - self.values) / np.where(self.bins, self.values, 1.0))[self.bins]
