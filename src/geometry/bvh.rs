@@ -57,7 +57,7 @@ impl Bvh8 {
             Aabb::new(tight.min - margin, tight.max + margin)
         };
         let boxes: Vec<Aabb> = triangles.iter().map(inflated).collect();
-        let params = BvhBuildParams { max_prims_per_leaf: WIDTH as u32, ..BvhBuildParams::medium_build() };
+        let params = BvhBuildParams { max_prims_per_leaf: WIDTH as u32, ..BvhBuildParams::slow_build() };
         Collapse::of(&build_bvh2(&boxes, params, &mut Default::default()))
     }
 

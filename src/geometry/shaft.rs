@@ -13,15 +13,37 @@ const NIL: f32 = 1e-20;
 /// Entries are taken to be this much earlier than computed.
 const EARLIER: f32 = 1.0 - 1.0 / (1 << 21) as f32;
 
+/// On which sides of a box segments enter along an axis, and leave.
+#[derive(Clone, Copy, Debug)]
+enum Way {
+    /// All segments run up: in at the low side, out at the high one.
+    Up,
+    /// All run down.
+    Down,
+    /// Some run up and some run down.
+    Both,
+}
+
+impl Way {
+    #[inline(always)]
+    fn new(least: f32, most: f32) -> Self {
+        if least > NIL {
+            Way::Up
+        } else if most < -NIL {
+            Way::Down
+        } else {
+            Way::Both
+        }
+    }
+}
+
 /// The segments from an apex to a box, made ready.
 pub(super) struct Shaft {
-    apex: [f32; 3],
     pub(super) directions: Directions,
-    /// Factors of a box's low and high sides in the time of entry.
-    enter: [[f32; 3]; 2],
-    /// Factors and terms of its high and low sides in the time of leaving.
-    leave: [[f32; 3]; 2],
-    stay: [[f32; 3]; 2],
+    ways: [Way; 3],
+    /// By axis, the times at the low and the high side of a box: factor and term of its coordinate.
+    low: [(f32, f32); 3],
+    high: [(f32, f32); 3],
 }
 
 impl Shaft {
@@ -29,20 +51,27 @@ impl Shaft {
     #[inline(always)]
     pub(super) fn new(apex: [f32; 3], low: [f32; 3], high: [f32; 3]) -> Self {
         let (mut least, mut most) = ([0.0; 3], [0.0; 3]);
-        let (mut enter, mut leave, mut stay) = ([[0.0; 3]; 2], [[0.0; 3]; 2], [[f32::INFINITY; 3]; 2]);
+        let mut shaft = Shaft {
+            directions: Directions::new(least, most),
+            ways: [Way::Both; 3],
+            low: [(0.0, 0.0); 3],
+            high: [(0.0, 0.0); 3],
+        };
         for axis in 0..3 {
             // Rounding is monotonic: every d of the bundle, rounded in the same way, lies between these.
             (least[axis], most[axis]) = (low[axis] - apex[axis], high[axis] - apex[axis]);
-            enter[0][axis] = 1.0 / most[axis].max(NIL);
-            enter[1][axis] = 1.0 / least[axis].min(-NIL);
-            if least[axis] > NIL {
-                (leave[0][axis], stay[0][axis]) = (1.0 / least[axis], 0.0);
-            }
-            if most[axis] < -NIL {
-                (leave[1][axis], stay[1][axis]) = (1.0 / most[axis], 0.0);
-            }
+            let way = Way::new(least[axis], most[axis]);
+            let (at_low, at_high) = match way {
+                Way::Up => (1.0 / most[axis], 1.0 / least[axis]),
+                Way::Down => (1.0 / most[axis], 1.0 / least[axis]),
+                Way::Both => (1.0 / most[axis].max(NIL), 1.0 / least[axis].min(-NIL)),
+            };
+            shaft.ways[axis] = way;
+            shaft.low[axis] = (at_low, -apex[axis] * at_low);
+            shaft.high[axis] = (at_high, -apex[axis] * at_high);
         }
-        Shaft { apex, directions: Directions::new(least, most), enter, leave, stay }
+        shaft.directions = Directions::new(least, most);
+        shaft
     }
 
     /// The children of `node` whose boxes some segment may meet.
@@ -50,14 +79,13 @@ impl Shaft {
     pub(super) fn meets<I: Isa>(&self, node: &Node) -> u32 {
         let (mut enter, mut leave) = (I::Eight::splat(0.0), I::Eight::splat(1.0));
         for axis in 0..3 {
-            let apex = I::Eight::splat(self.apex[axis]);
-            let low = I::Eight::load(&node.low[axis]).sub(apex);
-            let high = I::Eight::load(&node.high[axis]).sub(apex);
-            let [enter_low, enter_high] = lanes::<I>(&self.enter, axis);
-            let [leave_high, leave_low] = lanes::<I>(&self.leave, axis);
-            let [stay_high, stay_low] = lanes::<I>(&self.stay, axis);
-            enter = enter.max(low.mul(enter_low).max(high.mul(enter_high)));
-            leave = leave.min(high.mul_add(leave_high, stay_high).min(low.mul_add(leave_low, stay_low)));
+            let low = times::<I>(&node.low[axis], self.low[axis]);
+            let high = times::<I>(&node.high[axis], self.high[axis]);
+            match self.ways[axis] {
+                Way::Up => (enter, leave) = (enter.max(low), leave.min(high)),
+                Way::Down => (enter, leave) = (enter.max(high), leave.min(low)),
+                Way::Both => enter = enter.max(low).max(high),
+            }
         }
         let miss = leave.less(enter.mul(I::Eight::splat(EARLIER)));
         !miss & node.boxes
@@ -65,36 +93,49 @@ impl Shaft {
 }
 
 #[inline(always)]
-fn lanes<I: Isa>(sides: &[[f32; 3]; 2], axis: usize) -> [I::Eight; 2] {
-    [I::Eight::splat(sides[0][axis]), I::Eight::splat(sides[1][axis])]
+fn times<I: Isa>(sides: &[f32; WIDTH], (factor, term): (f32, f32)) -> I::Eight {
+    I::Eight::load(sides).mul_add(I::Eight::splat(factor), I::Eight::splat(term))
+}
+
+/// 1/d, and finite where d is 0.
+#[inline(always)]
+fn inverse<I: Isa>(d: I::Sixteen) -> I::Sixteen {
+    I::Sixteen::splat(1.0).div(d.abs().max(I::Sixteen::splat(NIL)).flip(d))
 }
 
 /// Sixteen segments from an apex, against one box at a time.
 pub(super) struct Bundle<I: Isa> {
-    inverse: [I::Sixteen; 3],
+    ways: [Way; 3],
+    /// By axis, the time at a coordinate: its factor and the term.
+    factor: [I::Sixteen; 3],
+    term: [I::Sixteen; 3],
 }
 
 impl<I: Isa> Bundle<I> {
-    /// The segments along `d`.
+    /// The segments along `d` from `apex`, all in `shaft`.
     #[inline(always)]
-    pub(super) fn new(d: &[I::Sixteen; 3]) -> Self {
-        let one = I::Sixteen::splat(1.0);
-        Bundle { inverse: [one.div(d[0]), one.div(d[1]), one.div(d[2])] }
+    pub(super) fn new(shaft: &Shaft, apex: [f32; 3], d: &[I::Sixteen; 3]) -> Self {
+        let mut bundle = Bundle::<I> { ways: shaft.ways, factor: *d, term: *d };
+        for axis in 0..3 {
+            bundle.factor[axis] = inverse::<I>(d[axis]);
+            bundle.term[axis] = bundle.factor[axis].mul(I::Sixteen::splat(-apex[axis]));
+        }
+        bundle
     }
 
     /// The segments that may meet box `slot` of `node`.
-    ///
-    /// A segment along one side of a box has an undefined time of entry; either answer is right, for the side is farther
-    /// from what is in the box than rounding is.
     #[inline(always)]
-    pub(super) fn meets(&self, node: &Node, slot: usize, apex: [f32; 3]) -> u32 {
+    pub(super) fn meets(&self, node: &Node, slot: usize) -> u32 {
         debug_assert!(slot < WIDTH);
         let (mut enter, mut leave) = (I::Sixteen::splat(0.0), I::Sixteen::splat(1.0));
         for axis in 0..3 {
-            let low = self.inverse[axis].mul(I::Sixteen::splat(node.low[axis][slot] - apex[axis]));
-            let high = self.inverse[axis].mul(I::Sixteen::splat(node.high[axis][slot] - apex[axis]));
-            enter = low.min(high).max(enter);
-            leave = low.max(high).min(leave);
+            let low = self.factor[axis].mul_add(I::Sixteen::splat(node.low[axis][slot]), self.term[axis]);
+            let high = self.factor[axis].mul_add(I::Sixteen::splat(node.high[axis][slot]), self.term[axis]);
+            match self.ways[axis] {
+                Way::Up => (enter, leave) = (enter.max(low), leave.min(high)),
+                Way::Down => (enter, leave) = (enter.max(high), leave.min(low)),
+                Way::Both => (enter, leave) = (enter.max(low.min(high)), leave.min(low.max(high))),
+            }
         }
         !leave.less(enter.mul(I::Sixteen::splat(EARLIER)))
     }

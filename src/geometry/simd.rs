@@ -17,6 +17,15 @@ use std::sync::OnceLock;
 /// The environment variable that names a [`Path`].
 pub const VARIABLE: &str = "LAMPYRIS_SIMD";
 
+/// Asks for all of `what` before it is needed.
+#[inline(always)]
+pub(super) fn prefetch<T>(what: &T) {
+    for line in 0..size_of::<T>().div_ceil(64) {
+        // SAFETY: a prefetch reads nothing; SSE is part of every x86-64 processor.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>((what as *const T).cast::<i8>().wrapping_add(64 * line)) }
+    }
+}
+
 /// Instructions that kernels are compiled for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Path {

@@ -16,11 +16,11 @@
 //! tile lies is known beforehand. Another kind of surface fits in like these, or as triangles whose bits are
 //! taken out of `hit` and given to f64 code of their own.
 
-use super::bvh::Node;
+use super::bvh::{Node, WIDTH};
 use super::mesh::{Mesh, bits};
 use super::planes::{Extent, Planes, Rows};
 use super::shaft::{Bundle, Shaft};
-use super::simd::{Isa, Vector};
+use super::simd::{Isa, Vector, prefetch};
 use super::{Geometry, Sphere};
 use crate::math::{DVec3, Vec3};
 use arrayvec::ArrayVec;
@@ -173,12 +173,9 @@ impl Mesh {
         if alone {
             self.shadow_one_by_one(apex, points, &points.far, seen);
         }
-        let mut descent = Descent { mesh: self, points, apex: apex.to_array(), scratch };
-        if !alone {
-            return descent.tile::<I>(seen);
-        }
         let mut near = *seen;
         near.iter_mut().zip(&points.far).for_each(|(near, far)| *near &= !far);
+        let mut descent = Descent { mesh: self, points, apex: apex.to_array(), scratch };
         descent.tile::<I>(&mut near);
         for ((seen, near), far) in seen.iter_mut().zip(near).zip(points.far) {
             *seen = near | *seen & far;
@@ -197,6 +194,18 @@ impl Mesh {
 
 /// Nodes that a shaft could not rule out, with the boxes of each that are left.
 type Candidates = ArrayVec<(u32, u32), CANDIDATES>;
+
+/// Segments up to which each is tested against a whole block.
+const SINGLY: u32 = 8;
+
+/// A node on the stack of a bundle.
+#[derive(Clone, Copy)]
+struct Open {
+    node: u32,
+    boxes: u32,
+    /// Points whose segments meet its box.
+    alive: u32,
+}
 
 /// Memory that a kernel works in: made once for many calls.
 #[derive(Default)]
@@ -336,32 +345,45 @@ impl Descent<'_> {
         let corners = self.points.bundles[bundle];
         let shaft = Shaft::new(self.apex, corners.0, corners.1);
         let d = self.points.segments::<I>(bundle, self.apex);
-        let segments = Bundle::<I>::new(&d);
-        let mut seen = seen;
-        let mut open: SmallVec<[(u32, u32); 256]> = SmallVec::new();
-        open.extend_from_slice(from);
-        while let Some((number, boxes)) = open.pop() {
-            let node = &self.mesh.bvh.nodes[number as usize];
+        let segments = Bundle::<I>::new(&shaft, self.apex, &d);
+        let mut seen = u32::from(seen);
+        let mut open: SmallVec<[Open; 256]> = SmallVec::new();
+        open.extend(from.iter().map(|&(node, boxes)| Open { node, boxes, alive: seen }));
+        while let Some(Open { node, boxes, alive }) = open.pop() {
+            if alive & seen == 0 {
+                continue;
+            }
+            let node = &self.mesh.bvh.nodes[node as usize];
             let met = shaft.meets::<I>(node) & boxes;
-            for slot in bits(met & node.blocks) {
-                if segments.meets(node, slot, self.apex) & u32::from(seen) == 0 {
+            let (mut blocks, mut near) = ([(0, 0); WIDTH], 0);
+            for slot in bits(met) {
+                let alive = segments.meets(node, slot) & alive & seen;
+                if alive == 0 {
                     continue;
                 }
-                seen = self.block::<I>(node, slot, bundle, &shaft, &d, seen);
-                if seen == 0 {
-                    return 0;
+                if node.blocks >> slot & 1 == 1 {
+                    prefetch(&self.mesh.blocks[node.child[slot] as usize]);
+                    blocks[near] = (slot, alive);
+                    near += 1;
+                } else {
+                    prefetch(&self.mesh.bvh.nodes[node.child[slot] as usize]);
+                    open.push(Open { node: node.child[slot], boxes: u32::MAX, alive });
                 }
             }
-            for slot in bits(met & !node.blocks) {
-                if segments.meets(node, slot, self.apex) & u32::from(seen) != 0 {
-                    open.push((node.child[slot], u32::MAX));
+            for &(slot, alive) in &blocks[..near] {
+                if alive & seen != 0 {
+                    seen = self.block::<I>(node, slot, bundle, &shaft, &d, alive & seen, seen);
+                    if seen == 0 {
+                        return 0;
+                    }
                 }
             }
         }
-        seen
+        seen as u16
     }
 
-    /// The points of `seen` that no triangle of a block blocks.
+    /// The points of `seen` that no triangle of a block blocks, where only those `alive` are near it.
+    #[expect(clippy::too_many_arguments, reason = "TODO")]
     #[inline(always)]
     fn block<I: Isa>(
         &mut self,
@@ -370,11 +392,15 @@ impl Descent<'_> {
         bundle: usize,
         shaft: &Shaft,
         d: &[I::Sixteen; 3],
-        seen: u16,
-    ) -> u16 {
+        alive: u32,
+        seen: u32,
+    ) -> u32 {
         let planes = self.planes::<I>(node, slot, shaft);
-        let against = planes.against(&shaft.directions);
         let there = (1u32 << node.triangles[slot]) - 1;
+        if alive.count_ones() <= SINGLY {
+            return self.singly::<I>(&planes, node.child[slot], there, bundle, alive, seen);
+        }
+        let against = planes.against(&shaft.directions);
         if against.cover & there != 0 {
             return 0;
         }
@@ -383,14 +409,39 @@ impl Descent<'_> {
             return seen;
         }
         planes.store(&mut self.scratch.rows);
-        let mut seen = seen;
+        let mut seen = seen as u16;
         for lane in bits(may) {
             seen = self.test_triangle::<I>(node.child[slot], lane, bundle, d, seen);
             if seen == 0 {
                 break;
             }
         }
+        u32::from(seen)
+    }
+
+    #[inline(always)]
+    fn singly<I: Isa>(&self, planes: &Planes<I>, block: u32, there: u32, bundle: usize, alive: u32, mut seen: u32) -> u32 {
+        for lane in bits(alive) {
+            let p = self.points;
+            let d = [p.x[bundle][lane] - self.apex[0], p.y[bundle][lane] - self.apex[1], p.z[bundle][lane] - self.apex[2]];
+            let decided = planes.test(d);
+            let blocked = if decided.hit & there != 0 {
+                true
+            } else {
+                let undecided = there & !decided.miss;
+                undecided != 0 && self.ask_f64_one(block, undecided, d)
+            };
+            seen &= !(u32::from(blocked) << lane);
+        }
         seen
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn ask_f64_one(&self, block: u32, undecided: u32, d: [f32; 3]) -> bool {
+        let first = self.mesh.bvh.firsts[block as usize] as usize;
+        let (apex, d) = (Vec3::from(self.apex).as_dvec3(), Vec3::from(d).as_dvec3());
+        bits(undecided).any(|lane| self.mesh.triangles[first + lane].crosses(apex, d))
     }
 
     #[inline(always)]
