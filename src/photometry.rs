@@ -3,6 +3,7 @@
 //! A [`Colour`] is a triple of linear Rec.709 values of one quantity; in a job with `channels = "luminance"`
 //! the three are equal and only the first is carried through the hot loop.
 
+use std::iter::Sum;
 use std::ops::{Add, AddAssign, Div, Mul, MulAssign};
 
 /// Luminance of the linear Rec.709 primaries (sum 1).
@@ -84,6 +85,12 @@ impl Div<f64> for Colour {
     type Output = Colour;
     fn div(self, k: f64) -> Colour {
         self.map(|c| c / k)
+    }
+}
+
+impl Sum for Colour {
+    fn sum<I: Iterator<Item = Colour>>(colours: I) -> Colour {
+        colours.fold(Colour::BLACK, |a, b| a + b)
     }
 }
 

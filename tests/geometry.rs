@@ -3,6 +3,7 @@
 mod common;
 
 use common::scenes::{add_quad, lambert};
+use lampyris::geometry::simd::Path;
 use lampyris::geometry::{Geometry, Hit, Mesh, Plane, Ray, Sphere};
 use lampyris::math::{DVec3, Vec3};
 use lampyris::random::{Domain, Generator, Stream, sphere};
@@ -163,4 +164,90 @@ fn equal_distances_go_to_the_lower_number() {
     let ray = Ray { origin: DVec3::new(0.2, 1.0, 0.2), direction: DVec3::NEG_Y };
     let Hit { primitive, front, .. } = geometry.closest_hit(&ray).unwrap();
     assert_eq!((primitive, front), (50, true));
+}
+
+/// The hits of `rays` in a packet and one by one, on every path of the processor, which must be the same bits.
+fn compare_packets(name: &str, triangles: &[[Vec3; 3]], rays: &[Ray]) -> usize {
+    let mut geometry = Geometry::new(
+        Mesh::new(triangles),
+        vec![Sphere { center: DVec3::new(1.0, 2.0, 0.5), radius: 0.3, inward: false }],
+        vec![Plane::new(DVec3::Z * -2.5, DVec3::Z)],
+    );
+    let mut first: Option<Vec<Option<Hit>>> = None;
+    for path in Path::ALL.into_iter().filter(|p| p.is_available()) {
+        geometry = geometry.with_path(path);
+        let mut packet = vec![None; rays.len()];
+        geometry.closest_hits(rays, &mut packet);
+        let single: Vec<_> = rays.iter().map(|r| geometry.closest_hit(r)).collect();
+        for (i, (packet, single)) in packet.iter().zip(&single).enumerate() {
+            assert_eq!(packet, single, "{name}: ray {i} of {} in a packet", path.name());
+        }
+        assert_eq!(&single, first.get_or_insert(single.clone()), "{name}: {}", path.name());
+    }
+    first.unwrap_or_default().iter().flatten().count()
+}
+
+#[test]
+fn packets_meet_what_single_rays_meet() {
+    let scenes = [("soup", soup(3000)), ("bumpy", bumpy_sphere(4)), ("grid", grid(12))];
+    let mut met = 0;
+    for (name, triangles) in scenes {
+        let mut rng = generator(name);
+        for round in 0..60 {
+            // Inside, on a lattice point of the grid, and outside, where rays go one by one.
+            let origin = match round % 4 {
+                0 | 1 => in_box(&mut rng, 1.5),
+                2 => (in_box(&mut rng, 2.0) * 4.0).round() / 4.0,
+                _ => in_box(&mut rng, 6.0),
+            };
+            let spread = [0.01, 0.1, 0.4, 2.0][round % 4];
+            let axis = if round % 3 == 0 { DVec3::AXES[round % 9 / 3] } else { sphere(rng.uniform2()) };
+            let ray = |i: usize| {
+                // Towards corners and along the axes too.
+                let corner = triangles[rng.below(triangles.len() as u32) as usize][i % 3].as_dvec3();
+                let around = (axis + in_box(&mut rng, spread)).normalize();
+                let lifted = if round % 5 == 4 { in_box(&mut rng, 1e-3) } else { DVec3::ZERO };
+                let direction = match i % 32 {
+                    5 => axis,
+                    9 if round % 4 == 3 => (corner - origin).normalize(),
+                    _ => around,
+                };
+                Ray { origin: origin + lifted, direction }
+            };
+            let rays: Vec<Ray> = (0..100).map(ray).collect();
+            met += compare_packets(name, &triangles, &rays);
+        }
+        met += corners_from_a_point(name, &triangles);
+    }
+    assert!(met > 5000, "only {met} rays met anything");
+}
+
+/// Packets towards corners and edges of single triangles, where the filter is in doubt.
+fn corners_from_a_point(name: &str, triangles: &[[Vec3; 3]]) -> usize {
+    let mut rng = generator("corners");
+    let mut met = 0;
+    for _ in 0..100 {
+        let origin = (in_box(&mut rng, 1.0)).as_vec3().as_dvec3();
+        let [a, b, c] = triangles[rng.below(triangles.len() as u32) as usize].map(|p| p.as_dvec3());
+        let ray = |i: u32| {
+            let along = f64::from(i % 16) / 15.0;
+            let (p, q) = [(a, b), (b, c), (c, a), (a, (a + b + c) / 3.0)][i as usize / 16];
+            Ray { origin, direction: (p + (q - p) * along - origin).normalize() }
+        };
+        let rays: Vec<Ray> = (0..64).map(ray).collect();
+        met += compare_packets(name, triangles, &rays);
+    }
+    met
+}
+
+/// Axis-aligned squares of a lattice in [-1, 1]^3, many of them seen edge-on from lattice points.
+fn grid(count: usize) -> Vec<[Vec3; 3]> {
+    let mut rng = generator("grid");
+    let mut all = Vec::new();
+    for i in 0..count * count {
+        let at = (in_box(&mut rng, 1.0) * 4.0).round() / 4.0;
+        let (u, v) = (DVec3::AXES[i % 3] * 0.25, DVec3::AXES[(i + 1) % 3] * 0.25);
+        all.extend([[at, at + u, at + v], [at + u, at + u + v, at + v]].map(|t| t.map(|p| p.as_vec3())));
+    }
+    all
 }

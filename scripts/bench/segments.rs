@@ -170,6 +170,11 @@ impl<'a> Tracer<'a> {
 
 /// What the centres of the camera's pixels see, pixels in Morton order.
 fn seen_by_camera(tracer: &Tracer, side: u32) -> Vec<Place> {
+    camera(side).into_iter().map(|flight| tracer.hit(flight).expect("the room is closed")).collect()
+}
+
+/// The rays through the centres of the camera's pixels, `side` x `side` in Morton order.
+pub fn camera(side: u32) -> Vec<Flight> {
     let eye = vec3(0.3, 0.35, 1.9);
     let forward = (vec3(3.6, 2.6, 1.1) - eye).normalize();
     let right = forward.cross(Vec3::Z).normalize();
@@ -177,8 +182,7 @@ fn seen_by_camera(tracer: &Tracer, side: u32) -> Vec<Place> {
     let across = |index: u32| ((index as f32 + 0.5) / side as f32 * 2.0 - 1.0) * 0.75;
     let pixel = |index: u32| {
         let (u, v) = (across(even_bits(index)), across(even_bits(index >> 1)));
-        let direction = (forward + right * u - up * v).normalize();
-        tracer.hit((eye, direction)).expect("the room is closed")
+        (eye, (forward + right * u - up * v).normalize())
     };
     (0..side * side).map(pixel).collect()
 }

@@ -6,7 +6,7 @@
 //! not grow with the picture, and histories in the groups that share paths: the points of all paths of a block and a group
 //! are sorted into tiles of neighbours, wherever they belong.
 
-use super::receivers::{ReceiverSet, Sensed};
+use super::receivers::{Paths, ReceiverSet, Sensed};
 use crate::geometry::kd_order;
 use crate::photometry::Colour;
 use crate::random::Generator;
@@ -15,6 +15,7 @@ use crate::tally::{Scores, Watched};
 use crate::transport::connection::{Connected, Connectors, Link, Rule, TILE, Tile, connect};
 use crate::transport::continuation::{Continuation, continue_from, is_due};
 use crate::transport::receiver::Receiver;
+use crate::transport::shared::{Shared, direct_light};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -35,8 +36,9 @@ pub fn score(
 ) -> Scores {
     let rule = Rule { bound: set.bound(), channels, orders: orders.clone() };
     let mut scores = Scores::zero(set.shape());
+    let shared = set.lit_points(scene, batch);
     for bins in order.chunks(BLOCK) {
-        let block = Block { set, scene, histories, rule: &rule, bins, batch };
+        let block = Block { set, scene, histories, shared: &shared, rule: &rule, bins, batch };
         for (&bin, score) in bins.iter().zip(block.scores()) {
             score.write(bin, &set.shape().monitored, &mut scores);
         }
@@ -49,22 +51,24 @@ struct Block<'a> {
     set: &'a ReceiverSet,
     scene: &'a Scene,
     histories: &'a Connectors,
+    /// Points of emitters, for each position in a bin.
+    shared: &'a [Connectors],
     rule: &'a Rule,
     bins: &'a [u32],
     batch: u64,
 }
 
-/// A receiver that is continued, with the generator of its paths in this batch.
+/// A receiver that is continued, with its paths in this batch.
 struct Continued {
     owner: u32,
     receiver: Receiver,
-    rng: Generator,
+    paths: Paths,
 }
 
 impl Block<'_> {
     fn scores(&self) -> Vec<BinScore> {
-        let sensed: Vec<Sensed> =
-            self.bins.par_iter().map(|&bin| self.set.sense(self.scene, bin as usize, self.batch)).collect();
+        let sense = |bins: &[u32]| self.set.sense(self.scene, bins, self.batch, self.shared, self.rule.channels);
+        let sensed: Vec<Sensed> = self.bins.par_chunks(TILE).flat_map_iter(sense).collect();
         let mut scores: Vec<BinScore> = sensed.iter().zip(self.bins).map(|(s, &bin)| self.nothing(s, bin)).collect();
         let all = 0..self.histories.histories();
         self.connect(self.links(&sensed), 0, all, &mut scores);
@@ -109,45 +113,74 @@ impl Block<'_> {
 
     /// Draws the continuations of the receivers that need them, and connects their points.
     fn connect_continuations(&self, sensed: &[Sensed], scores: &mut [BinScore]) {
+        let all = self.histories.histories();
+        let groups = (all / HISTORIES_OF_A_PATH).max(1);
         let continued = |(owner, sensed): (usize, &Sensed)| {
             let receiver = sensed.receiver.filter(|r| is_due(self.scene, r, self.rule.bound))?;
-            let rng = self.set.continuation(self.bins[owner], self.batch);
-            Some(Continued { owner: owner as u32, receiver, rng })
+            let paths = self.set.continuations(self.bins[owner], self.batch, groups);
+            Some(Continued { owner: owner as u32, receiver, paths })
         };
         let mut continued: Vec<Continued> = sensed.par_iter().enumerate().filter_map(continued).collect();
-        let all = self.histories.histories();
-        let groups = if continued.is_empty() { 0 } else { (all / HISTORIES_OF_A_PATH).max(1) };
+        if continued.is_empty() {
+            return;
+        }
+        let lit = self.set.lit_points_of_continuations(self.scene, self.batch, groups);
         for group in 0..groups {
             let histories = group * all / groups..(group + 1) * all / groups;
-            let draw = |c: &mut Continued| continue_from(self.scene, &c.receiver, self.rule.bound, &mut c.rng);
-            let paths: Vec<Continuation> = continued.par_iter_mut().map(draw).collect();
-            for (c, path) in continued.iter().zip(&paths) {
-                scores[c.owner as usize].caustic += path.caustic * histories.len() as f64;
+            let draw = |c: &mut Continued| {
+                let rng = c.paths.next();
+                let path = continue_from(self.scene, &c.receiver, self.rule.bound, rng);
+                (c.owner, path, rng.clone())
+            };
+            let paths: Vec<Path> = continued.par_iter_mut().map(draw).collect();
+            for (owner, path, _) in &paths {
+                scores[*owner as usize].caustic += path.caustic * histories.len() as f64;
             }
-            for (links, depth) in self.links_by_depth(&continued, paths).into_iter().zip(1..) {
+            for (points, depth) in points_by_depth(paths).into_iter().zip(1..) {
+                let links = self.light_points(points, depth, &lit, group);
                 self.connect(links, depth, histories.clone(), scores);
             }
         }
     }
 
-    /// The points of `paths`, neighbours together: one list for each number of reflections before their owners.
-    fn links_by_depth(&self, continued: &[Continued], paths: Vec<Continuation>) -> Vec<Vec<Link>> {
-        let mut by_depth: Vec<Vec<Link>> = Vec::new();
-        for (c, path) in continued.iter().zip(paths) {
-            for (k, (direct, point)) in path.direct.into_iter().zip(path.points).enumerate() {
-                if by_depth.len() == k {
-                    by_depth.push(Vec::new());
-                }
-                let counts = self.rule.orders.contains(&(k as u32 + 1));
-                by_depth[k].push(self.link(c.owner, point, if counts { direct } else { Colour::BLACK }));
-            }
-        }
-        let sorted = |links: Vec<Link>| {
-            let places: Vec<_> = links.iter().map(|l| l.receiver.position).collect();
-            kd_order(&places).into_iter().map(|i| links[i as usize]).collect()
+    /// The links of the points of continuations, with the direct light there.
+    fn light_points(&self, points: Vec<Point>, depth: u32, lit: &Connectors, group: usize) -> Vec<Link> {
+        let counts = self.rule.orders.contains(&depth);
+        let of_tile = |points: &mut [Point]| -> Vec<Link> {
+            let mut there: Vec<_> = points.iter_mut().map(|(_, receiver, rng)| (*receiver, rng)).collect();
+            let what = (true, self.rule.channels);
+            let light = direct_light(self.scene, &mut there, Shared::run(lit, group), 1, what);
+            let link = |((owner, receiver, _), light): (&Point, Colour)| {
+                self.link(*owner, *receiver, if counts { light } else { Colour::BLACK })
+            };
+            points.iter().zip(light).map(link).collect()
         };
-        by_depth.into_iter().map(sorted).collect()
+        let mut points = points;
+        points.par_chunks_mut(TILE).flat_map_iter(of_tile).collect()
     }
+}
+
+/// A path with its owner, and the generator that drew it.
+type Path = (u32, Continuation, Generator);
+/// A point of a path.
+type Point = (u32, Receiver, Generator);
+
+/// The points of `paths`, neighbours together: one list for each number of reflections before their owners.
+fn points_by_depth(paths: Vec<Path>) -> Vec<Vec<Point>> {
+    let mut by_depth: Vec<Vec<Point>> = Vec::new();
+    for (owner, path, rng) in paths {
+        for (k, point) in path.points.into_iter().enumerate() {
+            if by_depth.len() == k {
+                by_depth.push(Vec::new());
+            }
+            by_depth[k].push((owner, point, rng.clone()));
+        }
+    }
+    let sorted = |points: Vec<Point>| {
+        let places: Vec<_> = points.iter().map(|(_, point, _)| point.position).collect();
+        kd_order(&places).into_iter().map(|i| points[i as usize].clone()).collect()
+    };
+    by_depth.into_iter().map(sorted).collect()
 }
 
 /// The score of one bin.

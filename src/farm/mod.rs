@@ -9,13 +9,13 @@
 //! receivers     bins of a job -> receivers in a scene
 //! regions       parts of maps, one number a batch
 //! pilot         the bound of the kernel, fixed before the run
-//! local         histories of a batch x receivers of a set -> scores
-//! realization   batch index -> scores: with `local` the only parallel computation
+//! local         histories of a batch x receivers of a set -> scores, in parallel
+//! realization   batch index -> scores, in parallel
 //! checkpoint    one durable file for each shard
 //! status        headers -> progress
 //! worker        computes one shard
 //! coordinator   starts, watches, restarts worker processes
-//! merge         checkpoints -> one result
+//! merge         checkpoints -> one result, in parallel
 //! ```
 
 pub mod checkpoint;

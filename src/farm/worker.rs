@@ -1,6 +1,6 @@
 //! One shard, from where its checkpoint left it: batch after batch into the tally, checkpoints in between.
 //!
-//! The only place with a thread pool, and with a clock that decides when to write. A worker knows neither other
+//! The only place that makes a thread pool, and that has a clock that decides when to write. A worker knows neither other
 //! workers nor the final map; two workers on one shard by mistake compute the same batches and do no harm.
 
 use super::checkpoint::{self, Reader, Snapshot};
@@ -112,7 +112,7 @@ impl<'a> Work<'a> {
         let path = folder.shard_path(shard);
         let mut work =
             Work { plan, shard, path, tally: Tally::new(&plan.sets()), fixed_direct: None, seconds: 0.0, saved: 0 };
-        if let Some(mut reader) = Reader::open(&work.path, plan, shard)? {
+        if let Some(reader) = Reader::open(&work.path, plan, shard)? {
             work.tally = reader.tally()?;
             let fixed = (0..plan.sets().len()).map(|set| reader.fixed_direct(set)).collect::<Result<_>>()?;
             work.fixed_direct = Some(fixed);

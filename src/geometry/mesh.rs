@@ -5,12 +5,14 @@
 //! edge changes exactly their sign, so the two neighbours of an edge agree about the side on which a ray passes; a ray on the
 //! edge meets both. Everything before that, in f32 and for many triangles at once, is conservative.
 
-use super::bvh::{Bvh8, Node, WIDTH};
-use super::planes::{Block, Directions, Extent, Planes, splat};
-use super::simd::{Isa, Kernel, Path, Vector};
+use super::bvh::{Bvh8, WIDTH};
+use super::pages;
+use super::planes::Block;
+use super::ray::{Any, Closest};
+use super::simd::Path;
 use super::{Hit, Ray, hit};
 use crate::math::{DVec3, Vec3};
-use smallvec::SmallVec;
+use arrayvec::ArrayVec;
 
 /// How far from a triangle's box f64 may see a crossing, in units of the largest coordinate of a corner seen from the start
 /// of the ray: far more than f64 rounds, a quarter of what the boxes of the hierarchy are inflated by.
@@ -35,7 +37,7 @@ pub struct Mesh {
 /// A triangle as rays meet it.
 pub(super) struct Triangle {
     pub(super) corners: [Vec3; 3],
-    primitive: u32,
+    pub(super) primitive: u32,
 }
 
 impl Default for Mesh {
@@ -61,12 +63,12 @@ impl Mesh {
             place[primitive as usize] = at as u32;
         }
         let ordered = bvh.order.iter().map(|&p| Triangle { corners: triangles[p as usize], primitive: p });
-        let ordered: Vec<Triangle> = ordered.collect();
+        let ordered = pages::collect(triangles.len(), ordered);
         let block = |number: u32| {
             let corners: Vec<_> = ordered[bvh.block(number)].iter().map(|t| t.corners).collect();
             Block::new(&corners)
         };
-        let blocks = (0..bvh.firsts.len() as u32 - 1).map(block).collect();
+        let blocks = pages::collect(bvh.firsts.len() - 1, (0..bvh.firsts.len() as u32 - 1).map(block));
         let around = 0.01 * (bounds.1 - bounds.0).max_element();
         let near = (bounds.0 - around, bounds.1 + around);
         let floor = (size / (1u64 << 46) as f64) as f32;
@@ -95,7 +97,12 @@ impl Mesh {
     }
 
     pub(super) fn triangle(&self, primitive: u32) -> [DVec3; 3] {
-        self.triangles[self.place[primitive as usize] as usize].corners.map(|p| p.as_dvec3())
+        self.triangles[self.place(primitive) as usize].corners.map(|p| p.as_dvec3())
+    }
+
+    /// Where a primitive stands in the order of the blocks.
+    pub(super) fn place(&self, primitive: u32) -> u32 {
+        self.place[primitive as usize]
     }
 
     /// Parameters at which the line o + t d, t in 0 ..= `end`, enters and leaves the mesh; `None` when it misses it.
@@ -127,14 +134,7 @@ impl Mesh {
     }
 
     fn closest_hit_near(&self, ray: &Ray) -> Option<Hit> {
-        // Boxes and triangles must see the same ray, or a ray could pass between a box and its triangle.
-        let (origin, direction) = (ray.origin.as_vec3(), ray.direction.as_vec3());
-        let (distance, primitive) = self.path.run(Closest { mesh: self, origin, direction })?;
-        let [a, b, c] = self.triangle(primitive);
-        let normal = (b - a).cross(c - a).normalize();
-        let near = ray.origin + distance * ray.direction;
-        let position = near - normal.dot(near - a) * normal;
-        Some(Hit { primitive, ..hit(ray, distance, position, normal) })
+        self.path.run(Closest { mesh: self, ray })
     }
 
     /// True when a triangle crosses the segment from `a` to `b`, ends excluded.
@@ -149,46 +149,6 @@ impl Mesh {
             self.path.run(Any { mesh: self, origin: a, direction: b - a })
         })
     }
-}
-
-/// A ray in f32 on its way through the boxes.
-struct BoxRay<I: Isa> {
-    origin: [I::Eight; 3],
-    inverse: [I::Eight; 3],
-}
-
-impl<I: Isa> BoxRay<I> {
-    #[inline(always)]
-    fn new(origin: Vec3, direction: Vec3) -> Self {
-        BoxRay { origin: splat::<I>(origin.to_array()), inverse: splat::<I>((1.0 / direction).to_array()) }
-    }
-
-    /// The boxes of `node` that the ray meets before `end`, and when.
-    #[inline(always)]
-    fn meets(&self, node: &Node, end: f32) -> (u32, [f32; WIDTH]) {
-        let (mut enter, mut leave) = (I::Eight::splat(0.0), I::Eight::splat(end));
-        for axis in 0..3 {
-            let low = I::Eight::load(&node.low[axis]).sub(self.origin[axis]).mul(self.inverse[axis]);
-            let high = I::Eight::load(&node.high[axis]).sub(self.origin[axis]).mul(self.inverse[axis]);
-            enter = low.min(high).max(enter);
-            leave = low.max(high).min(leave);
-        }
-        let mut times = [0.0; WIDTH];
-        enter.store(&mut times);
-        (!leave.less(enter.mul(I::Eight::splat(1.0 - 1e-6))) & node.boxes, times)
-    }
-}
-
-/// The triangles of box `slot` of `node` that the ray from `origin` along `direction` may cross.
-#[inline(always)]
-fn candidates<I: Isa>(mesh: &Mesh, node: &Node, slot: usize, origin: Vec3, direction: Vec3) -> (usize, u32) {
-    let (apex, d) = (origin.to_array(), direction.to_array());
-    let extent = Extent::new(apex, node, slot);
-    let number = node.child[slot];
-    let block = &mesh.blocks[number as usize];
-    let planes = Planes::<I>::new(block, apex, extent, &Directions::new(d, d), mesh.floor);
-    let there = (1u32 << node.triangles[slot]) - 1;
-    (mesh.bvh.firsts[number as usize] as usize, planes.along(d) & there)
 }
 
 /// The numbers of the bits that are set.
@@ -214,100 +174,85 @@ impl Iterator for Bits {
     }
 }
 
-/// Nodes that wait for a ray; memory is asked for only in hierarchies of unusual depth.
-type Stack<T> = SmallVec<[T; 96]>;
-
-/// The nearest triangle along a ray: distance and primitive.
-struct Closest<'a> {
-    mesh: &'a Mesh,
-    origin: Vec3,
-    direction: Vec3,
+/// Boxes that wait for rays, by when they are entered.
+#[derive(Default)]
+pub(super) struct Open {
+    /// The bits of the time, which is not negative, above the node and the slot: one number to compare and to keep.
+    keys: ArrayVec<u64, 96>,
+    /// Those below, in hierarchies of unusual depth.
+    below: Vec<u64>,
 }
 
-impl Kernel for Closest<'_> {
-    type Output = Option<(f64, u32)>;
-
+impl Open {
+    /// Adds the boxes `met` of the node `number`, the nearest last.
     #[inline(always)]
-    fn run<I: Isa>(self) -> Option<(f64, u32)> {
-        let Closest { mesh, origin, direction } = self;
-        let (o, d) = (origin.as_dvec3(), direction.as_dvec3());
-        let ray = BoxRay::<I>::new(origin, direction);
-        let mut best: Option<(f64, u32)> = None;
-        // A box that begins at this very distance may hold a lower primitive number, hence the rounding up.
-        let mut end = f32::INFINITY;
-        let mut stack: Stack<(f32, u32)> = Stack::new();
-        if !mesh.is_empty() {
-            stack.push((0.0, 0));
+    pub(super) fn push(&mut self, number: u32, met: u32, times: &[f32; WIDTH]) {
+        if self.keys.remaining_capacity() < WIDTH {
+            self.make_room();
         }
-        while let Some((time, number)) = stack.pop() {
-            if time > end {
-                continue;
+        let bottom = self.keys.len();
+        for slot in bits(met) {
+            let key = u64::from(times[slot].to_bits()) << 32 | u64::from(number * WIDTH as u32 + slot as u32);
+            let mut at = self.keys.len();
+            self.keys.push(key);
+            while at > bottom && self.keys[at - 1] < key {
+                self.keys[at] = self.keys[at - 1];
+                at -= 1;
             }
-            let node = &mesh.bvh.nodes[number as usize];
-            let (met, times) = ray.meets(node, end);
-            for slot in bits(met & node.blocks) {
-                let (first, may) = candidates::<I>(mesh, node, slot, origin, direction);
-                for lane in bits(may) {
-                    let triangle = &mesh.triangles[first + lane];
-                    let limit = best.map_or(f64::INFINITY, |(t, _)| t);
-                    let Some(t) = triangle.intersect(o, d, limit) else { continue };
-                    if best.is_none_or(|b| (t, triangle.primitive) < b) {
-                        best = Some((t, triangle.primitive));
-                        end = (t * (1.0 + 1e-6)) as f32;
-                    }
-                }
-            }
-            push_sorted(&mut stack, bits(met & !node.blocks).map(|slot| (times[slot], node.child[slot])));
+            self.keys[at] = key;
         }
-        best
     }
-}
 
-/// Pushes nodes, the nearest last.
-#[inline(always)]
-fn push_sorted(stack: &mut Stack<(f32, u32)>, nodes: impl Iterator<Item = (f32, u32)>) {
-    let bottom = stack.len();
-    for node in nodes {
-        stack.push(node);
-        let mut at = stack.len() - 1;
-        while at > bottom && stack[at - 1].0 < node.0 {
-            stack.swap(at - 1, at);
-            at -= 1;
+    #[cold]
+    #[inline(never)]
+    fn make_room(&mut self) {
+        self.below.extend(self.keys.drain(..));
+    }
+
+    /// The time, node and slot of the box on top that is entered before `end`; it and all above it are taken off.
+    #[inline(always)]
+    pub(super) fn pop(&mut self, end: f32) -> Option<(f32, usize, usize)> {
+        loop {
+            let key = match self.keys.pop() {
+                Some(key) => key,
+                None => self.below.pop()?,
+            };
+            let (time, at) = (f32::from_bits((key >> 32) as u32), key as u32 as usize);
+            if time <= end {
+                return Some((time, at / WIDTH, at % WIDTH));
+            }
         }
     }
 }
 
-/// Whether any triangle crosses a segment.
-struct Any<'a> {
-    mesh: &'a Mesh,
-    origin: Vec3,
-    direction: Vec3,
+/// The plane of a triangle for rays from one point.
+pub(super) struct Face {
+    corner: DVec3,
+    /// N, of the length of twice the area.
+    normal: DVec3,
+    /// N . (corner - origin): a ray along d meets the plane at its quotient by N . d.
+    numerator: f64,
 }
 
-impl Kernel for Any<'_> {
-    type Output = bool;
-
+impl Face {
     #[inline(always)]
-    fn run<I: Isa>(self) -> bool {
-        let Any { mesh, origin, direction } = self;
-        let (o, d) = (origin.as_dvec3(), direction.as_dvec3());
-        let ray = BoxRay::<I>::new(origin, direction);
-        let mut stack: Stack<u32> = Stack::new();
-        if !mesh.is_empty() {
-            stack.push(0);
-        }
-        while let Some(number) = stack.pop() {
-            let node = &mesh.bvh.nodes[number as usize];
-            let (met, _) = ray.meets(node, 1.0);
-            for slot in bits(met & node.blocks) {
-                let (first, may) = candidates::<I>(mesh, node, slot, origin, direction);
-                if bits(may).any(|lane| mesh.triangles[first + lane].crosses(o, d)) {
-                    return true;
-                }
-            }
-            stack.extend(bits(met & !node.blocks).map(|slot| node.child[slot]));
-        }
-        false
+    pub(super) fn distance(&self, d: DVec3) -> f64 {
+        self.numerator / self.normal.dot(d)
+    }
+
+    /// The unit normal.
+    #[inline(always)]
+    pub(super) fn unit(&self) -> DVec3 {
+        // What `normalize` computes; its square root is an instruction of old, slow between those of wide vectors.
+        self.normal * (1.0 / self.normal.dot(self.normal).sqrt())
+    }
+
+    /// The hit of `ray` at `distance` on this face of `primitive`, with unit normal `unit`.
+    #[inline(always)]
+    pub(super) fn hit(&self, ray: &Ray, distance: f64, primitive: u32, unit: DVec3) -> Hit {
+        let near = ray.origin + distance * ray.direction;
+        let position = near - unit.dot(near - self.corner) * unit;
+        Hit { primitive, ..hit(ray, distance, position, unit) }
     }
 }
 
@@ -317,16 +262,23 @@ impl Triangle {
         Triangle { corners, primitive: 0 }
     }
 
+    /// Its plane for rays from `o`.
+    #[inline(always)]
+    pub(super) fn face(&self, o: DVec3) -> Face {
+        let [a, b, c] = self.corners.map(|p| p.as_dvec3());
+        let normal = (b - a).cross(c - a);
+        Face { corner: a, normal, numerator: normal.dot(a) - normal.dot(o) }
+    }
+
     /// Parameter 0 < t <= limit at which the line o + t d crosses the triangle, edges included.
     ///
     /// A line in the triangle's very plane has only roundings for t and for sides, and could seem to cross anywhere. So the
     /// crossing must lie in the box around the triangle, give or take [`AROUND`]: then no test of a box, which is
     /// inflated by more, can contradict, and the answer is the same by whatever way through the hierarchy.
     #[inline(always)]
-    fn intersect(&self, o: DVec3, d: DVec3, limit: f64) -> Option<f64> {
+    pub(super) fn intersect(&self, o: DVec3, d: DVec3, limit: f64) -> Option<f64> {
         let [a, b, c] = self.corners.map(|p| p.as_dvec3());
-        let normal = (b - a).cross(c - a);
-        let t = (normal.dot(a) - normal.dot(o)) / normal.dot(d);
+        let t = self.face(o).distance(d);
         // Edge-on the quotient is infinite or undefined: a triangle seen edge-on is not there.
         if !(t > 0.0 && t <= limit && t.is_finite()) {
             return None;

@@ -9,12 +9,18 @@
 //! point on an infinite plane lies farther out. That is a few roundings of an f32 coordinate; the distance, cosines
 //! and geometric factor of a connection use the points themselves.
 
+#![allow(clippy::needless_range_loop, reason = "several arrays go by one axis, lane or channel")]
+
 mod bvh;
 mod mesh;
 mod ordering;
+mod packet;
+mod pages;
 mod plane;
 mod planes;
+mod points;
 mod proximity;
+mod ray;
 mod shaft;
 pub mod simd;
 mod sphere;
@@ -26,7 +32,8 @@ pub use plane::Plane;
 pub use sphere::Sphere;
 
 use crate::math::{DVec3, Vec3};
-use simd::Path;
+use simd::{Isa, Kernel, Path};
+use visibility::{Lanes, Points, Scratch};
 
 /// Lift of a surface point in units of its coordinate size.
 const LIFT: f64 = 16.0 / (1u64 << 24) as f64;
@@ -107,7 +114,24 @@ impl Geometry {
 
     /// The first surface along `ray`; equal distances go to the lower primitive number.
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-        let mut best = self.mesh.closest_hit(ray);
+        let best = self.mesh.closest_hit(ray);
+        if self.spheres.is_empty() && self.planes.is_empty() { best } else { self.closest_of_all(ray, best) }
+    }
+
+    /// What [`Geometry::closest_hit`] gives for each of `rays`, to `hits`, of the same length. Rays from one point go
+    /// several times faster in this way, where 16 that follow each other point in nearly the same direction.
+    pub fn closest_hits(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        assert_eq!(rays.len(), hits.len(), "a hit for each ray");
+        self.mesh.closest_hits(rays, hits);
+        if !self.spheres.is_empty() || !self.planes.is_empty() {
+            for (ray, hit) in rays.iter().zip(hits) {
+                *hit = self.closest_of_all(ray, *hit);
+            }
+        }
+    }
+
+    /// The first surface along `ray`, which meets the triangles at `best`.
+    fn closest_of_all(&self, ray: &Ray, mut best: Option<Hit>) -> Option<Hit> {
         let mut number = self.mesh.len() as u32;
         let mut offer = |found: Option<Hit>| {
             if let Some(hit) = found
@@ -120,6 +144,12 @@ impl Geometry {
         self.spheres.iter().for_each(|s| offer(s.hit(ray)));
         self.planes.iter().for_each(|p| offer(p.hit(ray)));
         best
+    }
+
+    /// Clears the bits of the points in `seen` that `apex` does not see: [`Geometry::shadow`] with the instructions of the
+    /// processor, compiled once for all callers.
+    pub fn hide(&self, apex: Vec3, points: &Points, seen: &mut Lanes, scratch: &mut Scratch) {
+        self.path().run(Hide { geometry: self, apex, points, seen, scratch });
     }
 
     /// How far points of bounded geometry are lifted \[m\]: thinner things cannot cast a shadow on what touches them.
@@ -157,6 +187,24 @@ impl Geometry {
             let hit = self.closest_hit(&Ray { origin: point, direction });
             hit.is_some_and(|h| !h.front && absorbs(&h))
         })
+    }
+}
+
+/// See [`Geometry::hide`].
+struct Hide<'a> {
+    geometry: &'a Geometry,
+    apex: Vec3,
+    points: &'a Points,
+    seen: &'a mut Lanes,
+    scratch: &'a mut Scratch,
+}
+
+impl Kernel for Hide<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Isa>(self) {
+        self.geometry.shadow::<I>(self.apex, self.points, self.seen, self.scratch);
     }
 }
 

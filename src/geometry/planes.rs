@@ -31,11 +31,11 @@ use super::simd::{Isa, Vector};
 use crate::math::Vec3;
 
 /// Half the distance between 1 and the next f32.
-const U: f32 = 1.0 / (1 << 24) as f32;
+pub(super) const U: f32 = 1.0 / (1 << 24) as f32;
 /// Tolerance of the edges in units of u M L S.
 const EDGE: f32 = 48.0 * U;
 /// Tolerance of the face in units of |a| + |d|.
-const FACE: f32 = 5.1 * U;
+pub(super) const FACE: f32 = 5.1 * U;
 /// What f64 itself rounds: 28 2^-53 M^2 S.
 const EDGE_F64: f32 = U * U;
 /// Keeps tolerances above what underflow loses.
@@ -45,9 +45,9 @@ const TINY: f32 = 1e-36;
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
 pub(super) struct Block {
-    corners: [[[f32; WIDTH]; 3]; 3],
+    pub(super) corners: [[[f32; WIDTH]; 3]; 3],
     /// Unit normals, the cross products of f64 rounded; 0 for a triangle without area.
-    normal: [[f32; WIDTH]; 3],
+    pub(super) normal: [[f32; WIDTH]; 3],
 }
 
 impl Block {
@@ -97,6 +97,16 @@ impl Directions {
         }
         d.length = squares.sqrt();
         d
+    }
+}
+
+impl Directions {
+    /// From `apex` to the points of the box from `low` to `high`.
+    #[inline(always)]
+    pub(super) fn between(apex: [f32; 3], low: [f32; 3], high: [f32; 3]) -> Self {
+        // Rounding is monotonic: every d of the bundle, rounded in the same way, lies between these.
+        let [least, most] = [low, high].map(|p| [p[0] - apex[0], p[1] - apex[1], p[2] - apex[2]]);
+        Directions::new(least, most)
     }
 }
 
@@ -195,16 +205,17 @@ impl<I: Isa> Planes<I> {
         Against { may: !miss | self.doubtful, cover: cover & !self.doubtful }
     }
 
-    /// The triangles that the ray along `d`, of any length, may cross.
+    /// The triangles that some ray in a box of directions, of any length, may cross.
     #[inline(always)]
-    pub(super) fn along(&self, d: [f32; 3]) -> u32 {
-        let d = splat::<I>(d);
+    pub(super) fn toward(&self, directions: &Directions) -> u32 {
+        let center = splat::<I>(directions.center);
+        let half = splat::<I>(directions.half);
         let negative = I::Eight::splat(-self.edge_tolerance);
         let mut miss = 0;
         for edge in &self.edges {
-            miss |= dot::<I>(*edge, d).less(negative);
+            let (middle, spread) = (dot::<I>(*edge, center), dot::<I>(abs::<I>(*edge), half));
+            miss |= middle.add(spread).less(negative);
         }
-        miss |= dot::<I>(self.face, d).less(I::Eight::splat(-self.face_tolerance));
         !miss | self.doubtful
     }
 
@@ -255,6 +266,20 @@ pub(super) struct Decided {
 }
 
 impl Rows {
+    /// The planes again, with the tolerances of the directions that they were made for.
+    #[inline(always)]
+    pub(super) fn planes<I: Isa>(&self) -> Planes<I> {
+        let [first, second, third] = &self.edges;
+        Planes {
+            edges: [load::<I>(first), load::<I>(second), load::<I>(third)],
+            face: load::<I>(&self.face),
+            volume: I::Eight::load(&self.volume),
+            doubtful: self.doubtful,
+            edge_tolerance: self.edge_tolerance,
+            face_tolerance: self.face_tolerance,
+        }
+    }
+
     /// The triangle in `lane` against 16 rays along `d`.
     #[inline(always)]
     pub(super) fn test<I: Isa>(&self, lane: usize, d: &[I::Sixteen; 3]) -> Decided {
@@ -269,6 +294,32 @@ impl Rows {
         let hit = I::Sixteen::splat(edge).less(inside) & I::Sixteen::splat(face).less(beyond);
         Decided { miss, hit }
     }
+
+    /// The triangle in `lane` against 16 rays along unit vectors `d`.
+    #[inline(always)]
+    pub(super) fn meets<I: Isa>(&self, lane: usize, d: &[I::Sixteen; 3]) -> Meeting<I> {
+        let [first, second, third] = &self.edges;
+        let inside = along::<I>(first, lane, d).min(along::<I>(second, lane, d)).min(along::<I>(third, lane, d));
+        let toward = along::<I>(&self.face, lane, d);
+        let (edge, face, volume) = (I::Sixteen::splat(self.edge_tolerance), self.face_tolerance, self.volume[lane]);
+        let slope = I::Sixteen::splat(FACE);
+        let miss = inside.less(I::Sixteen::splat(-self.edge_tolerance)) | toward.less(I::Sixteen::splat(-FACE));
+        let early = I::Sixteen::splat((volume - face) * (1.0 - 8.0 * U)).div(toward.add(slope));
+        let late = I::Sixteen::splat((volume + face) * (1.0 + 8.0 * U)).div(toward.sub(slope));
+        if self.doubtful >> lane & 1 == 1 {
+            return Meeting { may: u32::MAX, sure: 0, early, late };
+        }
+        Meeting { may: !miss, sure: edge.less(inside) & slope.less(toward), early, late }
+    }
+}
+
+/// How 16 rays meet a triangle: the ones that may cross it, and the ones that surely do, at distances between `early` and `late`.
+#[derive(Clone, Copy)]
+pub(super) struct Meeting<I: Isa> {
+    pub(super) may: u32,
+    pub(super) sure: u32,
+    pub(super) early: I::Sixteen,
+    pub(super) late: I::Sixteen,
 }
 
 /// The scalar products of one normal with 16 directions.
@@ -280,7 +331,7 @@ fn along<I: Isa>(normals: &[[f32; WIDTH]; 3], lane: usize, d: &[I::Sixteen; 3]) 
 }
 
 #[inline(always)]
-fn load<I: Isa>(rows: &[[f32; WIDTH]; 3]) -> [I::Eight; 3] {
+pub(super) fn load<I: Isa>(rows: &[[f32; WIDTH]; 3]) -> [I::Eight; 3] {
     [I::Eight::load(&rows[0]), I::Eight::load(&rows[1]), I::Eight::load(&rows[2])]
 }
 
@@ -296,7 +347,7 @@ fn add<I: Isa>(a: [I::Eight; 3], b: [I::Eight; 3]) -> [I::Eight; 3] {
 }
 
 #[inline(always)]
-fn sub<I: Isa>(a: [I::Eight; 3], b: [I::Eight; 3]) -> [I::Eight; 3] {
+pub(super) fn sub<I: Isa>(a: [I::Eight; 3], b: [I::Eight; 3]) -> [I::Eight; 3] {
     [a[0].sub(b[0]), a[1].sub(b[1]), a[2].sub(b[2])]
 }
 
@@ -311,7 +362,7 @@ fn turn<I: Isa>(a: [I::Eight; 3], sign: I::Eight) -> [I::Eight; 3] {
 }
 
 #[inline(always)]
-fn dot<I: Isa>(a: [I::Eight; 3], b: [I::Eight; 3]) -> I::Eight {
+pub(super) fn dot<I: Isa>(a: [I::Eight; 3], b: [I::Eight; 3]) -> I::Eight {
     a[0].mul_add(b[0], a[1].mul_add(b[1], a[2].mul(b[2])))
 }
 

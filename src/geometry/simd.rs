@@ -10,21 +10,17 @@
 
 #![allow(unsafe_code, reason = "instructions that the compiler cannot know the processor to have; see `Path::run`")]
 
+mod plain;
+mod wide;
+
 use crate::error::{Error, Result};
-use std::arch::x86_64::*;
+use plain::Plain;
+use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
 use std::sync::OnceLock;
+use wide::{Pair, Ymm, Zmm};
 
 /// The environment variable that names a [`Path`].
 pub const VARIABLE: &str = "LAMPYRIS_SIMD";
-
-/// Asks for all of `what` before it is needed.
-#[inline(always)]
-pub(super) fn prefetch<T>(what: &T) {
-    for line in 0..size_of::<T>().div_ceil(64) {
-        // SAFETY: a prefetch reads nothing; SSE is part of every x86-64 processor.
-        unsafe { _mm_prefetch::<_MM_HINT_T0>((what as *const T).cast::<i8>().wrapping_add(64 * line)) }
-    }
-}
 
 /// Instructions that kernels are compiled for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,10 +47,17 @@ impl Path {
     }
 
     /// True when this processor has the instructions.
+    #[inline]
     pub fn is_available(self) -> bool {
+        // The standard library keeps what it detected, but asks for each of ten instructions.
+        static AVAILABLE: OnceLock<[bool; 3]> = OnceLock::new();
+        AVAILABLE.get_or_init(|| Path::ALL.map(Path::detect))[self as usize]
+    }
+
+    fn detect(self) -> bool {
         match self {
             Path::Avx512 => {
-                Path::Avx2.is_available()
+                Path::Avx2.detect()
                     && is_x86_feature_detected!("avx512f")
                     && is_x86_feature_detected!("avx512bw")
                     && is_x86_feature_detected!("avx512dq")
@@ -99,8 +102,7 @@ impl Path {
     #[inline]
     pub fn run<K: Kernel>(self, kernel: K) -> K::Output {
         match self {
-            // SAFETY: the assertions say that the processor has the instructions. The detection is kept by the
-            // standard library: asking again costs a load.
+            // SAFETY: the assertions say that the processor has the instructions; asking again costs a load.
             Path::Avx512 => {
                 assert!(self.is_available(), "no AVX-512 here");
                 unsafe { run_avx512(kernel) }
@@ -122,6 +124,15 @@ fn run_avx512<K: Kernel>(kernel: K) -> K::Output {
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
 fn run_avx2<K: Kernel>(kernel: K) -> K::Output {
     kernel.run::<Avx2>()
+}
+
+/// Asks for all of `what` before it is needed.
+#[inline(always)]
+pub(super) fn prefetch<T>(what: &T) {
+    for line in 0..size_of::<T>().div_ceil(64) {
+        // SAFETY: a prefetch reads nothing; SSE is part of every x86-64 processor.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>((what as *const T).cast::<i8>().wrapping_add(64 * line)) }
+    }
 }
 
 /// A computation that is compiled for every [`Isa`].
@@ -199,370 +210,6 @@ impl Isa for Avx2 {
 impl Isa for Scalar {
     type Eight = Plain<8>;
     type Sixteen = Plain<16>;
-}
-
-/// Eight lanes of AVX2.
-#[derive(Clone, Copy)]
-pub struct Ymm(__m256);
-
-// SAFETY, here and below: a vector exists inside a kernel alone, where the processor has its instructions; loads and stores
-// are those of whole arrays.
-impl Vector for Ymm {
-    type Array = [f32; 8];
-
-    #[inline(always)]
-    fn splat(x: f32) -> Self {
-        Ymm(unsafe { _mm256_set1_ps(x) })
-    }
-
-    #[inline(always)]
-    fn load(from: &[f32; 8]) -> Self {
-        Ymm(unsafe { _mm256_loadu_ps(from.as_ptr()) })
-    }
-
-    #[inline(always)]
-    fn store(self, to: &mut [f32; 8]) {
-        unsafe { _mm256_storeu_ps(to.as_mut_ptr(), self.0) }
-    }
-
-    #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        Ymm(unsafe { _mm256_add_ps(self.0, other.0) })
-    }
-
-    #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        Ymm(unsafe { _mm256_sub_ps(self.0, other.0) })
-    }
-
-    #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        Ymm(unsafe { _mm256_mul_ps(self.0, other.0) })
-    }
-
-    #[inline(always)]
-    fn div(self, other: Self) -> Self {
-        Ymm(unsafe { _mm256_div_ps(self.0, other.0) })
-    }
-
-    #[inline(always)]
-    fn min(self, other: Self) -> Self {
-        Ymm(unsafe { _mm256_min_ps(self.0, other.0) })
-    }
-
-    #[inline(always)]
-    fn max(self, other: Self) -> Self {
-        Ymm(unsafe { _mm256_max_ps(self.0, other.0) })
-    }
-
-    #[inline(always)]
-    fn mul_add(self, factor: Self, term: Self) -> Self {
-        Ymm(unsafe { _mm256_fmadd_ps(self.0, factor.0, term.0) })
-    }
-
-    #[inline(always)]
-    fn mul_sub(self, factor: Self, term: Self) -> Self {
-        Ymm(unsafe { _mm256_fmsub_ps(self.0, factor.0, term.0) })
-    }
-
-    #[inline(always)]
-    fn abs(self) -> Self {
-        Ymm(unsafe { _mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0) })
-    }
-
-    #[inline(always)]
-    fn flip(self, sign: Self) -> Self {
-        Ymm(unsafe { _mm256_xor_ps(self.0, _mm256_and_ps(_mm256_set1_ps(-0.0), sign.0)) })
-    }
-
-    #[inline(always)]
-    fn less(self, other: Self) -> u32 {
-        unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LT_OQ>(self.0, other.0)) as u32 }
-    }
-
-    #[inline(always)]
-    fn select(self, mask: u32) -> Self {
-        unsafe {
-            let bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
-            let set = _mm256_and_si256(_mm256_set1_epi32(mask as i32), bits);
-            Ymm(_mm256_and_ps(self.0, _mm256_castsi256_ps(_mm256_cmpeq_epi32(set, bits))))
-        }
-    }
-}
-
-/// Sixteen lanes of AVX-512.
-#[derive(Clone, Copy)]
-pub struct Zmm(__m512);
-
-impl Vector for Zmm {
-    type Array = [f32; 16];
-
-    #[inline(always)]
-    fn splat(x: f32) -> Self {
-        Zmm(unsafe { _mm512_set1_ps(x) })
-    }
-
-    #[inline(always)]
-    fn load(from: &[f32; 16]) -> Self {
-        Zmm(unsafe { _mm512_loadu_ps(from.as_ptr()) })
-    }
-
-    #[inline(always)]
-    fn store(self, to: &mut [f32; 16]) {
-        unsafe { _mm512_storeu_ps(to.as_mut_ptr(), self.0) }
-    }
-
-    #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        Zmm(unsafe { _mm512_add_ps(self.0, other.0) })
-    }
-
-    #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        Zmm(unsafe { _mm512_sub_ps(self.0, other.0) })
-    }
-
-    #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        Zmm(unsafe { _mm512_mul_ps(self.0, other.0) })
-    }
-
-    #[inline(always)]
-    fn div(self, other: Self) -> Self {
-        Zmm(unsafe { _mm512_div_ps(self.0, other.0) })
-    }
-
-    #[inline(always)]
-    fn min(self, other: Self) -> Self {
-        Zmm(unsafe { _mm512_min_ps(self.0, other.0) })
-    }
-
-    #[inline(always)]
-    fn max(self, other: Self) -> Self {
-        Zmm(unsafe { _mm512_max_ps(self.0, other.0) })
-    }
-
-    #[inline(always)]
-    fn mul_add(self, factor: Self, term: Self) -> Self {
-        Zmm(unsafe { _mm512_fmadd_ps(self.0, factor.0, term.0) })
-    }
-
-    #[inline(always)]
-    fn mul_sub(self, factor: Self, term: Self) -> Self {
-        Zmm(unsafe { _mm512_fmsub_ps(self.0, factor.0, term.0) })
-    }
-
-    #[inline(always)]
-    fn abs(self) -> Self {
-        Zmm(unsafe { _mm512_abs_ps(self.0) })
-    }
-
-    #[inline(always)]
-    fn flip(self, sign: Self) -> Self {
-        Zmm(unsafe { _mm512_xor_ps(self.0, _mm512_and_ps(_mm512_set1_ps(-0.0), sign.0)) })
-    }
-
-    #[inline(always)]
-    fn less(self, other: Self) -> u32 {
-        unsafe { u32::from(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(self.0, other.0)) }
-    }
-
-    #[inline(always)]
-    fn select(self, mask: u32) -> Self {
-        Zmm(unsafe { _mm512_maskz_mov_ps(mask as u16, self.0) })
-    }
-}
-
-/// Sixteen lanes in two registers of AVX2.
-#[derive(Clone, Copy)]
-pub struct Pair(Ymm, Ymm);
-
-impl Pair {
-    #[inline(always)]
-    fn halves(array: &[f32; 16]) -> (&[f32; 8], &[f32; 8]) {
-        let (low, high) = array.split_first_chunk().expect("8 of 16");
-        (low, high.first_chunk().expect("8 more"))
-    }
-}
-
-impl Vector for Pair {
-    type Array = [f32; 16];
-
-    #[inline(always)]
-    fn splat(x: f32) -> Self {
-        Pair(Ymm::splat(x), Ymm::splat(x))
-    }
-
-    #[inline(always)]
-    fn load(from: &[f32; 16]) -> Self {
-        let (low, high) = Pair::halves(from);
-        Pair(Ymm::load(low), Ymm::load(high))
-    }
-
-    #[inline(always)]
-    fn store(self, to: &mut [f32; 16]) {
-        let (low, high) = to.split_first_chunk_mut().expect("8 of 16");
-        self.0.store(low);
-        self.1.store(high.first_chunk_mut().expect("8 more"));
-    }
-
-    #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        Pair(self.0.add(other.0), self.1.add(other.1))
-    }
-
-    #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        Pair(self.0.sub(other.0), self.1.sub(other.1))
-    }
-
-    #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        Pair(self.0.mul(other.0), self.1.mul(other.1))
-    }
-
-    #[inline(always)]
-    fn div(self, other: Self) -> Self {
-        Pair(self.0.div(other.0), self.1.div(other.1))
-    }
-
-    #[inline(always)]
-    fn min(self, other: Self) -> Self {
-        Pair(self.0.min(other.0), self.1.min(other.1))
-    }
-
-    #[inline(always)]
-    fn max(self, other: Self) -> Self {
-        Pair(self.0.max(other.0), self.1.max(other.1))
-    }
-
-    #[inline(always)]
-    fn mul_add(self, factor: Self, term: Self) -> Self {
-        Pair(self.0.mul_add(factor.0, term.0), self.1.mul_add(factor.1, term.1))
-    }
-
-    #[inline(always)]
-    fn mul_sub(self, factor: Self, term: Self) -> Self {
-        Pair(self.0.mul_sub(factor.0, term.0), self.1.mul_sub(factor.1, term.1))
-    }
-
-    #[inline(always)]
-    fn abs(self) -> Self {
-        Pair(self.0.abs(), self.1.abs())
-    }
-
-    #[inline(always)]
-    fn flip(self, sign: Self) -> Self {
-        Pair(self.0.flip(sign.0), self.1.flip(sign.1))
-    }
-
-    #[inline(always)]
-    fn less(self, other: Self) -> u32 {
-        self.0.less(other.0) | self.1.less(other.1) << 8
-    }
-
-    #[inline(always)]
-    fn select(self, mask: u32) -> Self {
-        Pair(self.0.select(mask & 0xff), self.1.select(mask >> 8))
-    }
-}
-
-/// Lanes of plain Rust.
-#[derive(Clone, Copy)]
-pub struct Plain<const N: usize>([f32; N]);
-
-impl<const N: usize> Plain<N> {
-    #[inline(always)]
-    fn zip(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self {
-        let mut lanes = [0.0; N];
-        for (i, lane) in lanes.iter_mut().enumerate() {
-            *lane = f(self.0[i], other.0[i]);
-        }
-        Plain(lanes)
-    }
-}
-
-impl<const N: usize> Vector for Plain<N> {
-    type Array = [f32; N];
-
-    #[inline(always)]
-    fn splat(x: f32) -> Self {
-        Plain([x; N])
-    }
-
-    #[inline(always)]
-    fn load(from: &[f32; N]) -> Self {
-        Plain(*from)
-    }
-
-    #[inline(always)]
-    fn store(self, to: &mut [f32; N]) {
-        *to = self.0;
-    }
-
-    #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        self.zip(other, |a, b| a + b)
-    }
-
-    #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        self.zip(other, |a, b| a - b)
-    }
-
-    #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        self.zip(other, |a, b| a * b)
-    }
-
-    #[inline(always)]
-    fn div(self, other: Self) -> Self {
-        self.zip(other, |a, b| a / b)
-    }
-
-    #[inline(always)]
-    fn min(self, other: Self) -> Self {
-        self.zip(other, |a, b| if a < b { a } else { b })
-    }
-
-    #[inline(always)]
-    fn max(self, other: Self) -> Self {
-        self.zip(other, |a, b| if a > b { a } else { b })
-    }
-
-    #[inline(always)]
-    fn mul_add(self, factor: Self, term: Self) -> Self {
-        self.mul(factor).add(term)
-    }
-
-    #[inline(always)]
-    fn mul_sub(self, factor: Self, term: Self) -> Self {
-        self.mul(factor).sub(term)
-    }
-
-    #[inline(always)]
-    fn abs(self) -> Self {
-        self.zip(self, |a, _| a.abs())
-    }
-
-    #[inline(always)]
-    fn flip(self, sign: Self) -> Self {
-        self.zip(sign, |a, s| f32::from_bits(a.to_bits() ^ (s.to_bits() & (-0f32).to_bits())))
-    }
-
-    #[inline(always)]
-    fn less(self, other: Self) -> u32 {
-        (0..N).map(|i| u32::from(self.0[i] < other.0[i]) << i).sum()
-    }
-
-    #[inline(always)]
-    fn select(self, mask: u32) -> Self {
-        let mut lanes = self.0;
-        for (i, lane) in lanes.iter_mut().enumerate() {
-            *lane = f32::from_bits(lane.to_bits() & 0u32.wrapping_sub(mask >> i & 1));
-        }
-        Plain(lanes)
-    }
 }
 
 #[cfg(test)]

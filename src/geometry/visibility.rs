@@ -6,7 +6,7 @@
 //!
 //! ```text
 //! tile -> shaft against nodes -> candidates -> group -> shaft -> candidates -> bundle -> shaft, then 16 segments against
-//! boxes -> 8 triangles as planes through the apex: all segments miss, all are blocked, or each is asked
+//! boxes -> 8 triangles as planes through the apex, against each segment that is left, or each triangle against all
 //! ```
 //!
 //! Every step before a triangle is conservative and the planes leave to f64 what they cannot tell ([`super::planes`]), so the
@@ -16,15 +16,19 @@
 //! tile lies is known beforehand. Another kind of surface fits in like these, or as triangles whose bits are
 //! taken out of `hit` and given to f64 code of their own.
 
-use super::bvh::{Node, WIDTH};
+mod bundle;
+
+use super::bvh::Node;
 use super::mesh::{Mesh, bits};
-use super::planes::{Extent, Planes, Rows};
-use super::shaft::{Bundle, Shaft};
-use super::simd::{Isa, Vector, prefetch};
+use super::planes::{Directions, Extent, Planes, Rows};
+use super::points::Corners;
+use super::shaft::Shaft;
+use super::simd::Isa;
 use super::{Geometry, Sphere};
-use crate::math::{DVec3, Vec3};
+use crate::math::Vec3;
 use arrayvec::ArrayVec;
-use smallvec::SmallVec;
+
+pub use super::points::Points;
 
 /// Points of a tile.
 pub const TILE: usize = 256;
@@ -33,99 +37,18 @@ pub const BUNDLE: usize = 16;
 /// Bundles of a tile.
 pub const BUNDLES: usize = TILE / BUNDLE;
 /// Bundles of a group.
-const GROUP: usize = 4;
+pub(super) const GROUP: usize = 4;
 /// Nodes that a shaft hands down, at most.
 const CANDIDATES: usize = 64;
 /// Nodes that the shaft of a tile or a group opens: beyond that its groups or bundles go on alone.
 const OPENED: usize = 4;
 /// Blocks whose triangles the shaft of a tile or a group tests at once, at most.
-const FEW: u32 = 4;
+const FEW: u32 = 12;
+/// Triangles that every bundle of a tile or a group is asked for, at most.
+const MANY: u32 = 12;
 
 /// For each bundle of a tile, a bit for each of its points.
 pub type Lanes = [u16; BUNDLES];
-
-/// A box between two corners \[m\].
-type Corners = ([f32; 3], [f32; 3]);
-
-/// Up to [`TILE`] lifted points, as the kernel wants them.
-#[derive(Debug)]
-pub struct Points {
-    x: [[f32; BUNDLE]; BUNDLES],
-    y: [[f32; BUNDLE]; BUNDLES],
-    z: [[f32; BUNDLE]; BUNDLES],
-    tile: Corners,
-    groups: [Corners; BUNDLES / GROUP],
-    bundles: [Corners; BUNDLES],
-    /// Points so far from the mesh that they go through it alone.
-    far: Lanes,
-    /// Of each plane, the points in front of it and those behind it.
-    sides: Vec<[Lanes; 2]>,
-    /// Of each sphere, the points inside.
-    inside: Vec<Lanes>,
-}
-
-impl Points {
-    /// The tile of `points`, at most [`TILE`] \[m\].
-    pub fn new(geometry: &Geometry, points: &[Vec3]) -> Self {
-        let empty = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-        let mut tile = Points {
-            x: [[0.0; BUNDLE]; BUNDLES],
-            y: [[0.0; BUNDLE]; BUNDLES],
-            z: [[0.0; BUNDLE]; BUNDLES],
-            tile: empty,
-            groups: [empty; BUNDLES / GROUP],
-            bundles: [empty; BUNDLES],
-            far: [0; BUNDLES],
-            sides: Vec::new(),
-            inside: Vec::new(),
-        };
-        for (i, &point) in points.iter().enumerate() {
-            let (bundle, lane) = (i / BUNDLE, i % BUNDLE);
-            (tile.x[bundle][lane], tile.y[bundle][lane], tile.z[bundle][lane]) = point.into();
-            if geometry.mesh.is_near(point.as_dvec3()) {
-                for corners in [&mut tile.tile, &mut tile.groups[bundle / GROUP], &mut tile.bundles[bundle]] {
-                    include(corners, point);
-                }
-            } else {
-                tile.far[bundle] |= 1 << lane;
-            }
-        }
-        let where_true = |is: &dyn Fn(DVec3) -> bool| {
-            let mut lanes = [0; BUNDLES];
-            for (i, point) in points.iter().enumerate() {
-                lanes[i / BUNDLE] |= u16::from(is(point.as_dvec3())) << (i % BUNDLE);
-            }
-            lanes
-        };
-        let sides = |p: &super::Plane| [where_true(&|q| p.height(q) > 0.0), where_true(&|q| p.height(q) < 0.0)];
-        tile.sides = geometry.planes.iter().map(sides).collect();
-        tile.inside = geometry.spheres.iter().map(|s| where_true(&|q| s.contains(q))).collect();
-        tile
-    }
-
-    /// A point of the tile \[m\].
-    #[inline(always)]
-    fn point(&self, bundle: usize, lane: usize) -> Vec3 {
-        Vec3::new(self.x[bundle][lane], self.y[bundle][lane], self.z[bundle][lane])
-    }
-
-    /// The segments from `apex` to the points of a bundle.
-    #[inline(always)]
-    fn segments<I: Isa>(&self, bundle: usize, apex: [f32; 3]) -> [I::Sixteen; 3] {
-        [
-            I::Sixteen::load(&self.x[bundle]).sub(I::Sixteen::splat(apex[0])),
-            I::Sixteen::load(&self.y[bundle]).sub(I::Sixteen::splat(apex[1])),
-            I::Sixteen::load(&self.z[bundle]).sub(I::Sixteen::splat(apex[2])),
-        ]
-    }
-}
-
-fn include(corners: &mut Corners, point: Vec3) {
-    for axis in 0..3 {
-        corners.0[axis] = corners.0[axis].min(point[axis]);
-        corners.1[axis] = corners.1[axis].max(point[axis]);
-    }
-}
 
 impl Geometry {
     /// Clears the bits of the points in `seen` that `apex` does not see.
@@ -175,6 +98,7 @@ impl Mesh {
         }
         let mut near = *seen;
         near.iter_mut().zip(&points.far).for_each(|(near, far)| *near &= !far);
+        // In one place: it is long, and compiled whole.
         let mut descent = Descent { mesh: self, points, apex: apex.to_array(), scratch };
         descent.tile::<I>(&mut near);
         for ((seen, near), far) in seen.iter_mut().zip(near).zip(points.far) {
@@ -195,22 +119,10 @@ impl Mesh {
 /// Nodes that a shaft could not rule out, with the boxes of each that are left.
 type Candidates = ArrayVec<(u32, u32), CANDIDATES>;
 
-/// Segments up to which each is tested against a whole block.
-const SINGLY: u32 = 8;
-
-/// A node on the stack of a bundle.
-#[derive(Clone, Copy)]
-struct Open {
-    node: u32,
-    boxes: u32,
-    /// Points whose segments meet its box.
-    alive: u32,
-}
-
 /// Memory that a kernel works in: made once for many calls.
 #[derive(Default)]
 pub struct Scratch {
-    rows: Rows,
+    few: [Rows; FEW as usize],
 }
 
 /// One apex on its way through the hierarchy.
@@ -284,164 +196,77 @@ impl Descent<'_> {
         if blocks == 0 {
             return None;
         }
-        if blocks <= FEW { self.test_few::<I>(left, &shaft, first, seen) } else { Some(left) }
+        if blocks > FEW {
+            return Some(left);
+        }
+        self.test_few::<I>(&mut left, &shaft, first, seen).then_some(left)
     }
 
-    /// Tests the triangles of a few blocks for a whole tile or group; what is left of them.
+    /// Tests the triangles of a few blocks for a whole tile or group: their planes are set up once, and asked of each group before
+    /// each bundle. True where there are too many of them, and smaller shafts must go on with what is left of `few`.
     #[inline(always)]
-    fn test_few<I: Isa>(
-        &mut self,
-        mut few: Candidates,
-        shaft: &Shaft,
-        first: usize,
-        seen: &mut [u16],
-    ) -> Option<Candidates> {
-        let mut undecided = false;
-        for k in 0..few.len() {
-            let (number, boxes) = few[k];
-            let node = &self.mesh.bvh.nodes[number as usize];
-            for slot in bits(boxes) {
+    fn test_few<I: Isa>(&mut self, few: &mut Candidates, shaft: &Shaft, first: usize, seen: &mut [u16]) -> bool {
+        let mut asked: ArrayVec<(u32, u32), { FEW as usize }> = ArrayVec::new();
+        let mut triangles = 0;
+        for (number, boxes) in few.iter_mut() {
+            let node = &self.mesh.bvh.nodes[*number as usize];
+            for slot in bits(*boxes) {
                 let planes = self.planes::<I>(node, slot, shaft);
                 let against = planes.against(&shaft.directions);
                 let there = (1u32 << node.triangles[slot]) - 1;
                 if against.cover & there != 0 {
                     seen.fill(0);
-                    return None;
+                    return false;
                 }
                 let may = against.may & there;
-                if may.count_ones() > 2 {
-                    undecided = true;
-                    continue;
-                }
-                few[k].1 &= !(1 << slot);
-                if may != 0 && self.test_all::<I>(&planes, node.child[slot], may, first, seen) {
-                    return None;
+                triangles += may.count_ones();
+                if may == 0 {
+                    *boxes &= !(1 << slot);
+                } else if triangles <= MANY {
+                    planes.store(&mut self.scratch.few[asked.len()]);
+                    asked.push((node.child[slot], may));
                 }
             }
         }
-        undecided.then_some(few)
+        if triangles > MANY {
+            return true;
+        }
+        if !asked.is_empty() {
+            for (group, seen) in seen.chunks_mut(GROUP).enumerate() {
+                self.test_group::<I>(&asked, first + group * GROUP, seen);
+            }
+        }
+        false
     }
 
-    /// Tests the triangles `may` of a block against the bundles from `first` on; true when no point is left.
+    /// Tests the triangles of the blocks `asked`, whose planes are in the scratch, against the group of bundles from `first` on.
     #[inline(always)]
-    fn test_all<I: Isa>(&mut self, planes: &Planes<I>, block: u32, may: u32, first: usize, seen: &mut [u16]) -> bool {
-        planes.store(&mut self.scratch.rows);
-        let mut left = 0;
-        for (k, seen) in seen.iter_mut().enumerate() {
-            if *seen != 0 {
-                let d = self.points.segments::<I>(first + k, self.apex);
-                for lane in bits(may) {
-                    *seen = self.test_triangle::<I>(block, lane, first + k, &d, *seen);
-                }
-                left |= *seen;
-            }
+    fn test_group<I: Isa>(&mut self, asked: &[(u32, u32)], first: usize, seen: &mut [u16]) {
+        if seen.iter().all(|&lanes| lanes == 0) {
+            return;
         }
-        left == 0
-    }
-
-    /// The points of `seen` in a bundle that none of the candidates blocks.
-    #[inline(always)]
-    fn bundle<I: Isa>(&mut self, from: &[(u32, u32)], bundle: usize, seen: u16) -> u16 {
-        let corners = self.points.bundles[bundle];
-        let shaft = Shaft::new(self.apex, corners.0, corners.1);
-        let d = self.points.segments::<I>(bundle, self.apex);
-        let segments = Bundle::<I>::new(&shaft, self.apex, &d);
-        let mut seen = u32::from(seen);
-        let mut open: SmallVec<[Open; 256]> = SmallVec::new();
-        open.extend(from.iter().map(|&(node, boxes)| Open { node, boxes, alive: seen }));
-        while let Some(Open { node, boxes, alive }) = open.pop() {
-            if alive & seen == 0 {
-                continue;
+        let (low, high) = self.points.groups[first / GROUP];
+        let directions = Directions::between(self.apex, low, high);
+        let mut may: [u32; FEW as usize] = [0; FEW as usize];
+        for (k, &(_, triangles)) in asked.iter().enumerate() {
+            let against = self.scratch.few[k].planes::<I>().against(&directions);
+            if against.cover & triangles != 0 {
+                return seen.fill(0);
             }
-            let node = &self.mesh.bvh.nodes[node as usize];
-            let met = shaft.meets::<I>(node) & boxes;
-            let (mut blocks, mut near) = ([(0, 0); WIDTH], 0);
-            for slot in bits(met) {
-                let alive = segments.meets(node, slot) & alive & seen;
-                if alive == 0 {
-                    continue;
-                }
-                if node.blocks >> slot & 1 == 1 {
-                    prefetch(&self.mesh.blocks[node.child[slot] as usize]);
-                    blocks[near] = (slot, alive);
-                    near += 1;
-                } else {
-                    prefetch(&self.mesh.bvh.nodes[node.child[slot] as usize]);
-                    open.push(Open { node: node.child[slot], boxes: u32::MAX, alive });
-                }
-            }
-            for &(slot, alive) in &blocks[..near] {
-                if alive & seen != 0 {
-                    seen = self.block::<I>(node, slot, bundle, &shaft, &d, alive & seen, seen);
-                    if seen == 0 {
-                        return 0;
-                    }
+            may[k] = against.may & triangles;
+        }
+        if may.iter().all(|&triangles| triangles == 0) {
+            return;
+        }
+        for (k, seen) in seen.iter_mut().enumerate().filter(|(_, seen)| **seen != 0) {
+            let d = self.points.segments::<I>(first + k, self.apex);
+            for (place, &(block, _)) in asked.iter().enumerate() {
+                for lane in bits(may[place]) {
+                    let rows = &self.scratch.few[place];
+                    *seen = self.test_triangle::<I>(rows, block, lane, first + k, &d, *seen);
                 }
             }
         }
-        seen as u16
-    }
-
-    /// The points of `seen` that no triangle of a block blocks, where only those `alive` are near it.
-    #[expect(clippy::too_many_arguments, reason = "TODO")]
-    #[inline(always)]
-    fn block<I: Isa>(
-        &mut self,
-        node: &Node,
-        slot: usize,
-        bundle: usize,
-        shaft: &Shaft,
-        d: &[I::Sixteen; 3],
-        alive: u32,
-        seen: u32,
-    ) -> u32 {
-        let planes = self.planes::<I>(node, slot, shaft);
-        let there = (1u32 << node.triangles[slot]) - 1;
-        if alive.count_ones() <= SINGLY {
-            return self.singly::<I>(&planes, node.child[slot], there, bundle, alive, seen);
-        }
-        let against = planes.against(&shaft.directions);
-        if against.cover & there != 0 {
-            return 0;
-        }
-        let may = against.may & there;
-        if may == 0 {
-            return seen;
-        }
-        planes.store(&mut self.scratch.rows);
-        let mut seen = seen as u16;
-        for lane in bits(may) {
-            seen = self.test_triangle::<I>(node.child[slot], lane, bundle, d, seen);
-            if seen == 0 {
-                break;
-            }
-        }
-        u32::from(seen)
-    }
-
-    #[inline(always)]
-    fn singly<I: Isa>(&self, planes: &Planes<I>, block: u32, there: u32, bundle: usize, alive: u32, mut seen: u32) -> u32 {
-        for lane in bits(alive) {
-            let p = self.points;
-            let d = [p.x[bundle][lane] - self.apex[0], p.y[bundle][lane] - self.apex[1], p.z[bundle][lane] - self.apex[2]];
-            let decided = planes.test(d);
-            let blocked = if decided.hit & there != 0 {
-                true
-            } else {
-                let undecided = there & !decided.miss;
-                undecided != 0 && self.ask_f64_one(block, undecided, d)
-            };
-            seen &= !(u32::from(blocked) << lane);
-        }
-        seen
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn ask_f64_one(&self, block: u32, undecided: u32, d: [f32; 3]) -> bool {
-        let first = self.mesh.bvh.firsts[block as usize] as usize;
-        let (apex, d) = (Vec3::from(self.apex).as_dvec3(), Vec3::from(d).as_dvec3());
-        bits(undecided).any(|lane| self.mesh.triangles[first + lane].crosses(apex, d))
     }
 
     #[inline(always)]
@@ -453,8 +278,16 @@ impl Descent<'_> {
 
     /// The points of `seen` that one triangle does not block.
     #[inline(always)]
-    fn test_triangle<I: Isa>(&self, block: u32, lane: usize, bundle: usize, d: &[I::Sixteen; 3], seen: u16) -> u16 {
-        let decided = self.scratch.rows.test::<I>(lane, d);
+    fn test_triangle<I: Isa>(
+        &self,
+        rows: &Rows,
+        block: u32,
+        lane: usize,
+        bundle: usize,
+        d: &[I::Sixteen; 3],
+        seen: u16,
+    ) -> u16 {
+        let decided = rows.test::<I>(lane, d);
         let seen = seen & !(decided.hit as u16);
         let undecided = seen & !(decided.miss as u16);
         if undecided == 0 { seen } else { self.ask_f64(block, lane, bundle, undecided, seen) }

@@ -30,6 +30,10 @@ pub enum Domain {
     Continuation,
     /// Scrambling of the quasi-random set of a batch; the index is the batch.
     Scrambling,
+    /// Scrambling of the points of emitters that the receivers of one set share; the index is `batch * positions + position`.
+    Emitter,
+    /// Scrambling of the first directions of receiver-side continuations; the index is `batch * bins + bin`.
+    Direction,
     /// Paths from the receivers of one receiver set; the index is `batch * bins + bin`.
     Reverse,
 }
@@ -42,6 +46,8 @@ impl Domain {
             Domain::Pilot => "lampyris 1 pilot",
             Domain::Continuation => "lampyris 1 continuation",
             Domain::Scrambling => "lampyris 1 scrambling",
+            Domain::Emitter => "lampyris 1 emitter",
+            Domain::Direction => "lampyris 1 direction",
             Domain::Reverse => "lampyris 1 reverse",
         }
     }

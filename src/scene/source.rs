@@ -156,6 +156,12 @@ impl Emitter {
         self.luminance * (PI * self.area * if self.double_sided { 2.0 } else { 1.0 })
     }
 
+    /// Square of the length of its longest edge \[m2\].
+    pub fn longest_edge_squared(&self) -> f64 {
+        let [a, b, c] = self.corners;
+        a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a))
+    }
+
     /// The point with barycentric coordinates uniform in area.
     pub fn point(&self, u: crate::math::DVec2) -> DVec3 {
         let [a, b, c] = self.corners;
@@ -218,9 +224,15 @@ impl Sources {
 
     /// Chooses an emitter in proportion to flux by `u` in [0, 1): the emitter and its probability.
     pub fn choose_emitter(&self, u: f64) -> (&Emitter, f64) {
+        let (number, probability) = self.choose_number(u);
+        (&self.emitters[number], probability)
+    }
+
+    /// The same, the emitter by its number.
+    pub fn choose_number(&self, u: f64) -> (usize, f64) {
         let all = last(&self.emitter_flux);
-        let emitter = &self.emitters[choose(&self.emitter_flux, u * all)];
-        (emitter, emitter.flux().luminance() / all)
+        let number = choose(&self.emitter_flux, u * all);
+        (number, self.emitters[number].flux().luminance() / all)
     }
 
     /// The emitter that is the triangle `primitive`, with its probability in [`Sources::choose_emitter`].
@@ -228,6 +240,11 @@ impl Sources {
         let index = self.emitters.binary_search_by_key(&primitive, |e| e.primitive).ok()?;
         let emitter = &self.emitters[index];
         Some((emitter, emitter.flux().luminance() / last(&self.emitter_flux)))
+    }
+
+    /// The emitters with their numbers.
+    pub fn numbered(&self) -> impl Iterator<Item = (u32, &Emitter)> {
+        (0..).zip(&self.emitters)
     }
 
     /// Starts a history. With a single source no number is drawn for the choice.

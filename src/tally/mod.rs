@@ -67,18 +67,20 @@ impl Scores {
 
     /// Feeds every bit of these scores to `hasher`.
     fn digest_into(&self, hasher: &mut blake3::Hasher) {
-        let mut feed = |x: &f64| {
-            hasher.update(&x.to_bits().to_le_bytes());
-        };
-        self.value.iter().for_each(&mut feed);
-        self.direct.iter().for_each(&mut feed);
-        self.colour.iter().flatten().for_each(&mut feed);
-        self.peak.iter().for_each(&mut feed);
-        self.caustic.iter().for_each(&mut feed);
-        self.watched.iter().flat_map(|w| &w.totals).for_each(&mut feed);
-        self.existed.iter().for_each(|&e| {
-            hasher.update(&[u8::from(e)]);
-        });
+        let numbers = [&self.value[..], &self.direct, self.colour.as_flattened(), &self.peak, &self.caustic];
+        let watched = self.watched.iter().map(|w| &w.totals[..]);
+        numbers.into_iter().chain(watched).for_each(|numbers| feed(hasher, numbers));
+        let existed: Vec<u8> = self.existed.iter().map(|&e| u8::from(e)).collect();
+        hasher.update(&existed);
+    }
+}
+
+/// Feeds every bit of `numbers` to `hasher`, many at a time: it is several times as fast on runs of kilobytes.
+fn feed(hasher: &mut blake3::Hasher, numbers: &[f64]) {
+    let mut bytes = [[0; 8]; 2048];
+    for some in numbers.chunks(bytes.len()) {
+        bytes.iter_mut().zip(some).for_each(|(to, x)| *to = x.to_le_bytes());
+        hasher.update(bytes[..some.len()].as_flattened());
     }
 }
 

@@ -101,16 +101,17 @@ impl MomentBlock {
         let (a, b) = (n_a as f64, n_b as f64);
         let n = a + b;
         let mean = |x: f64, y: f64| x + (y - x) * b / n;
-        for i in 0..self.len() {
-            let d = other.mean[i] - self.mean[i];
-            self.mean[i] = mean(self.mean[i], other.mean[i]);
-            self.m2[i] = self.m2[i] + other.m2[i] + d * d * a * b / n;
-            self.direct[i] = mean(self.direct[i], other.direct[i]);
-            self.peak[i] = self.peak[i].max(other.peak[i]);
-            self.caustic[i] = self.caustic[i].max(other.caustic[i]);
-            // Saturating: a count from a file is not ours to trust.
-            self.existed[i] = self.existed[i].saturating_add(other.existed[i]);
+        // Column by column, so that the compiler takes several bins at a time.
+        for ((m2, &more), (x, y)) in self.m2.iter_mut().zip(&other.m2).zip(self.mean.iter().zip(&other.mean)) {
+            let d = y - x;
+            *m2 = *m2 + more + d * d * a * b / n;
         }
+        self.mean.iter_mut().zip(&other.mean).for_each(|(x, &y)| *x = mean(*x, y));
+        self.direct.iter_mut().zip(&other.direct).for_each(|(x, &y)| *x = mean(*x, y));
+        self.peak.iter_mut().zip(&other.peak).for_each(|(x, &y)| *x = x.max(y));
+        self.caustic.iter_mut().zip(&other.caustic).for_each(|(x, &y)| *x = x.max(y));
+        // Saturating: a count from a file is not ours to trust.
+        self.existed.iter_mut().zip(&other.existed).for_each(|(x, &y)| *x = x.saturating_add(y));
         for (x, y) in self.colour.iter_mut().zip(&other.colour) {
             *x = std::array::from_fn(|c| mean(x[c], y[c]));
         }

@@ -14,79 +14,20 @@
 //! scores do not depend on by whom tiles are computed. Numbers come from plain f32 operations without contraction, which give the
 //! same bits whatever the width of the vectors they are compiled to; see [`crate::geometry::simd`].
 
+#![allow(clippy::needless_range_loop, reason = "several arrays go by one axis, lane or channel")]
+
+use super::connectors::Connector;
 use super::receiver::Receiver;
-use super::trajectory::Vertex;
+use super::totals::{Column, Sums, Totals};
 use crate::geometry::simd::{Isa, Kernel, Vector};
 use crate::geometry::visibility::{BUNDLE, BUNDLES, Lanes, Points, Scratch};
-use crate::math::{PI, Vec3};
+use crate::math::Vec3;
 use crate::photometry::Colour;
 use crate::scene::Scene;
 use std::ops::Range;
 
+pub use super::connectors::{Connectors, LitPoint};
 pub use crate::geometry::visibility::TILE;
-
-/// A vertex as the kernel wants it.
-#[derive(Clone, Copy, Debug)]
-struct Connector {
-    position: Vec3,
-    lifted: Vec3,
-    normal: Vec3,
-    /// W_n rho / pi of a Lambert vertex \[lm/sr\].
-    intensity: [f32; 3],
-    /// n, the reflections that light scattered here has seen.
-    order: u32,
-    /// True where the bound does not apply.
-    after_delta: bool,
-    /// The vertex itself where the law of reflection depends on direction.
-    glossy: Option<Vertex>,
-}
-
-/// The vertices of many histories, ready to be connected.
-#[derive(Debug, Default)]
-pub struct Connectors {
-    all: Vec<Connector>,
-    /// True when some vertex was lit straight by a delta scatterer.
-    mirrored: bool,
-    /// End of each history in `all`.
-    ends: Vec<usize>,
-}
-
-impl Connectors {
-    /// Appends the vertices of the next history.
-    pub fn push(&mut self, scene: &Scene, history: &[Vertex]) {
-        self.all.extend(history.iter().map(|v| connector(scene, v)));
-        self.mirrored |= history.iter().any(|v| v.after_delta);
-        self.ends.push(self.all.len());
-    }
-
-    /// Number of histories, those without vertices included.
-    pub fn histories(&self) -> usize {
-        self.ends.len()
-    }
-
-    /// Number of vertices.
-    pub fn vertices(&self) -> usize {
-        self.all.len()
-    }
-
-    fn iter(&self, histories: Range<usize>) -> impl Iterator<Item = &[Connector]> {
-        let mut start = histories.start.checked_sub(1).map_or(0, |before| self.ends[before]);
-        self.ends[histories].iter().map(move |&end| &self.all[std::mem::replace(&mut start, end)..end])
-    }
-}
-
-fn connector(scene: &Scene, v: &Vertex) -> Connector {
-    let lambert = scene.surface(v.primitive).reflectance.lambert();
-    Connector {
-        position: v.position.as_vec3(),
-        lifted: scene.geometry.lift(v.position, v.normal).as_vec3(),
-        normal: v.normal.as_vec3(),
-        intensity: (v.weight * lambert.unwrap_or(Colour::BLACK) / PI).0.map(|c| c as f32),
-        order: v.order,
-        after_delta: v.after_delta,
-        glossy: lambert.is_none().then_some(*v),
-    }
-}
 
 /// A point to which histories are connected on behalf of an owner: the receiver itself, or a point of its continuation.
 #[derive(Clone, Copy, Debug)]
@@ -173,115 +114,6 @@ impl<const C: usize> Kernel for Channels<'_, C> {
     }
 }
 
-/// f32 lanes of a tile.
-type Column = [[f32; BUNDLE]; BUNDLES];
-
-/// What one history gives the links of a tile, constant responses left out.
-struct Sums<const C: usize> {
-    light: [Column; C],
-    /// The part of `light` by vertices that a delta scatterer lit straight.
-    mirrored: [Column; C],
-    has_mirrored: bool,
-}
-
-impl<const C: usize> Sums<C> {
-    fn new() -> Self {
-        let zero = [[[0.0; BUNDLE]; BUNDLES]; C];
-        Sums { light: zero, mirrored: zero, has_mirrored: false }
-    }
-
-    #[inline(always)]
-    fn clear(&mut self) {
-        self.light = [[[0.0; BUNDLE]; BUNDLES]; C];
-        if std::mem::take(&mut self.has_mirrored) {
-            self.mirrored = [[[0.0; BUNDLE]; BUNDLES]; C];
-        }
-    }
-}
-
-/// What all histories so far give the links of a tile, lane by lane.
-struct Totals<const C: usize> {
-    constant: [[f64; TILE]; C],
-    start: [[f64; TILE]; C],
-    sum: [[f64; TILE]; C],
-    /// Of the history at hand, the luminous total.
-    total: [f64; TILE],
-    peak: [f64; TILE],
-    mirrored: [f64; TILE],
-    watched: Vec<(usize, Vec<f64>)>,
-}
-
-impl<const C: usize> Totals<C> {
-    fn new(tile: &Tile) -> Self {
-        let column = |of: &dyn Fn(usize) -> Colour| {
-            let mut columns = [[0.0; TILE]; C];
-            for i in 0..tile.links.len() {
-                columns.iter_mut().zip(of(i).0).for_each(|(column, value)| column[i] = value);
-            }
-            columns
-        };
-        let watched = tile.links.iter().enumerate().filter(|(_, l)| l.watched);
-        Totals {
-            constant: column(&|i| tile.constant[i].unwrap_or(Colour::WHITE)),
-            start: column(&|i| tile.links[i].start),
-            sum: [[0.0; TILE]; C],
-            total: [0.0; TILE],
-            peak: [0.0; TILE],
-            mirrored: [0.0; TILE],
-            watched: watched.map(|(i, _)| (i, Vec::new())).collect(),
-        }
-    }
-
-    /// Takes in what one history gave.
-    #[inline(always)]
-    fn add(&mut self, sums: &Sums<C>, tile: &Tile) {
-        let lanes = tile.bundles() * BUNDLE;
-        let lanes = lanes.min(TILE);
-        for i in 0..lanes {
-            let mut total = [0.0; C];
-            for c in 0..C {
-                total[c] = self.start[c][i] + f64::from(sums.light[c].as_flattened()[i]) * self.constant[c][i];
-                self.sum[c][i] += total[c];
-            }
-            self.total[i] = luminance(total);
-            self.peak[i] = if self.total[i] > self.peak[i] { self.total[i] } else { self.peak[i] };
-        }
-        for (i, totals) in &mut self.watched {
-            totals.push(self.total[*i]);
-        }
-        if sums.has_mirrored {
-            for i in 0..lanes {
-                let part = |c: usize| f64::from(sums.mirrored[c].as_flattened()[i]) * self.constant[c][i];
-                self.mirrored[i] += luminance(std::array::from_fn::<f64, C, _>(part));
-            }
-        }
-    }
-
-    /// Link by link.
-    fn connected(mut self, tile: &Tile) -> Vec<Connected> {
-        let mut watched = std::mem::take(&mut self.watched).into_iter().peekable();
-        let of_link = |i: usize| Connected {
-            sum: colour(std::array::from_fn::<f64, C, _>(|c| self.sum[c][i])),
-            peak: self.peak[i],
-            mirrored: self.mirrored[i],
-            totals: watched.next_if(|(at, _)| *at == i).map(|(_, totals)| totals),
-        };
-        (0..tile.links.len()).map(of_link).collect()
-    }
-}
-
-/// The colour of one channel, or of three.
-#[inline(always)]
-fn colour<const C: usize>(channels: [f64; C]) -> Colour {
-    Colour(std::array::from_fn(|c| channels[c.min(C - 1)]))
-}
-
-/// The luminance of one channel, or of three.
-#[inline(always)]
-fn luminance<const C: usize>(channels: [f64; C]) -> f64 {
-    if C == 1 { channels[0] } else { colour(channels).luminance() }
-}
-
 #[inline(always)]
 fn splat<I: Isa>(v: Vec3) -> [I::Sixteen; 3] {
     [I::Sixteen::splat(v.x), I::Sixteen::splat(v.y), I::Sixteen::splat(v.z)]
@@ -301,15 +133,17 @@ fn dot<I: Isa>(a: &[I::Sixteen; 3], b: &[I::Sixteen; 3]) -> I::Sixteen {
 /// At most [`TILE`] links as a structure of arrays.
 #[derive(Debug)]
 pub struct Tile {
-    links: Vec<Link>,
+    pub(super) links: Vec<Link>,
     /// Reflections between these receivers and their owners.
     depth: u32,
     position: [Column; 3],
     normal: [Column; 3],
     lifted: Points,
     /// Response of each receiver where it does not depend on direction.
-    constant: Vec<Option<Colour>>,
+    pub(super) constant: Vec<Option<Colour>>,
     all_constant: bool,
+    /// Receivers that take no light from the shared points of an emitter.
+    refused: Vec<(u32, Lanes)>,
 }
 
 impl Tile {
@@ -332,7 +166,22 @@ impl Tile {
             all_constant: constant.iter().all(Option::is_some),
             constant,
             links,
+            refused: Vec::new(),
         }
+    }
+
+    /// The same tile without the light of the shared points of emitters at some of its receivers: entry by entry the number of
+    /// an emitter, and for each receiver whether it refuses.
+    pub fn refusing(mut self, refused: impl Iterator<Item = (u32, Vec<bool>)>) -> Self {
+        let lanes = |all: Vec<bool>| {
+            let mut lanes: Lanes = [0; BUNDLES];
+            for (i, refused) in all.into_iter().enumerate() {
+                lanes[i / BUNDLE] |= u16::from(refused) << (i % BUNDLE);
+            }
+            lanes
+        };
+        self.refused = refused.map(|(emitter, all)| (emitter, lanes(all))).collect();
+        self
     }
 
     /// The links, in the order in which they were given.
@@ -341,7 +190,7 @@ impl Tile {
     }
 
     #[inline(always)]
-    fn bundles(&self) -> usize {
+    pub(super) fn bundles(&self) -> usize {
         self.links.len().div_ceil(BUNDLE)
     }
 
@@ -358,10 +207,13 @@ impl Tile {
         let mut factors: Column = [[0.0; BUNDLE]; BUNDLES];
         let mut seen: Lanes = [0; BUNDLES];
         self.factors::<I>(vertex, &mut factors, &mut seen);
+        for (_, refused) in self.refused.iter().filter(|(emitter, _)| Some(*emitter) == vertex.emitter) {
+            seen.iter_mut().zip(refused).for_each(|(seen, refused)| *seen &= !refused);
+        }
         if seen == [0; BUNDLES] {
             return;
         }
-        scene.geometry.shadow::<I>(vertex.lifted, &self.lifted, &mut seen, scratch);
+        scene.geometry.hide(vertex.lifted, &self.lifted, &mut seen, scratch);
         // No continuation finds what came from a delta scatterer: all of it is connected.
         let bound = if vertex.after_delta { f32::INFINITY } else { bound };
         self.spread::<I, C>(scene, vertex, &factors, &seen, bound, &mut sums.light);

@@ -24,7 +24,7 @@
 //! component: light that a mirror sends to y_k is carried by connections alone (their b is infinite then), so
 //! bounded and plain estimates have the same mean.
 
-use super::direct::{from_emitters, from_lights, from_lights_as_if_matt};
+use super::direct::from_lights_as_if_matt;
 use super::receiver::{Receiver, Response};
 use crate::geometry::{Hit, Ray};
 use crate::math::DVec3;
@@ -40,9 +40,7 @@ const MAX_POINTS: u32 = 1 << 12;
 /// A path from a receiver.
 #[derive(Clone, Debug, Default)]
 pub struct Continuation {
-    /// Direct light reflected at its points, as the receiver responds to it \[lx or cd/m2\]; one entry for each point.
-    pub direct: Vec<Colour>,
-    /// y_1, y_2, ... as receivers whose response holds T_k.
+    /// y_1, y_2, ... as receivers whose response holds T_k: direct light at them counts as any other.
     pub points: Vec<Receiver>,
     /// Luminous light of sources without extent at the peaked points, as the receiver would respond to it if they were
     /// matt \[lx or cd/m2\]. What they really reflect of it has this order of magnitude and comes in spikes: no
@@ -76,7 +74,6 @@ pub fn continue_from(scene: &Scene, receiver: &Receiver, bound: f64, rng: &mut G
             weight = weight / survival;
         }
         let next = found.receiver(scene, weight);
-        path.direct.push(from_lights(scene, &next) + from_emitters(scene, &next, 1, rng));
         if next.response.is_peaked() {
             path.caustic += from_lights_as_if_matt(scene, &next).luminance();
         }

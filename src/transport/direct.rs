@@ -72,6 +72,26 @@ pub fn from_emitters(scene: &Scene, receiver: &Receiver, samples: u64, rng: &mut
     sum / samples as f64
 }
 
+/// The same from the emitters with the numbers `some` alone, for a receiver whose response is not peaked.
+pub fn from_some_emitters(
+    scene: &Scene,
+    receiver: &Receiver,
+    some: &[u32],
+    samples: u64,
+    rng: &mut Generator,
+) -> Colour {
+    let lifted = scene.geometry.lift(receiver.position, receiver.normal);
+    let mut sum = Colour::BLACK;
+    for &number in some {
+        let emitter = &scene.sources.emitters[number as usize];
+        if let Some(sight) = Sight::new(emitter, 1.0, lifted) {
+            let of_one: Colour = (0..samples).map(|_| sample_emitter(scene, receiver, &sight, rng)).sum();
+            sum += of_one;
+        }
+    }
+    sum / samples as f64
+}
+
 /// One sample of the light from the emitter in sight.
 fn sample_emitter(scene: &Scene, receiver: &Receiver, sight: &Sight, rng: &mut Generator) -> Colour {
     let Some(point) = sight.sample(rng) else { return Colour::BLACK };
@@ -126,8 +146,7 @@ impl<'a> Sight<'a> {
         if side == 0.0 || (side < 0.0 && !emitter.double_sided) {
             return None;
         }
-        let edge2 = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
-        let far = ((a + b + c) / 3.0 - from).length_squared() > FAR * FAR * edge2;
+        let far = ((a + b + c) / 3.0 - from).length_squared() > FAR * FAR * emitter.longest_edge_squared();
         let triangle = (!far).then(|| SphericalTriangle::new(&emitter.corners, from));
         Some(Sight { emitter, probability, from, normal: emitter.normal * side.signum(), triangle })
     }

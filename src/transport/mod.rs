@@ -39,11 +39,14 @@
 //! Transport does not know files, threads, shards, how many histories run, nor the shape of a picture.
 
 pub mod connection;
+mod connectors;
 pub mod continuation;
 pub mod crossing;
 pub mod direct;
 pub mod eye;
 pub mod receiver;
 pub mod reverse;
+pub mod shared;
 mod spherical_triangle;
+mod totals;
 pub mod trajectory;

@@ -159,7 +159,7 @@ pub fn batches_of(shard: u64) -> u64 {
 /// All that a checkpoint says, every section verified.
 pub fn content(dir: &Path, shard: u64) -> (Tally, Vec<Vec<u64>>) {
     let plan = plan_in(dir);
-    let mut reader = Reader::open(&dir.join(checkpoint(shard)), &plan, shard).unwrap().unwrap();
+    let reader = Reader::open(&dir.join(checkpoint(shard)), &plan, shard).unwrap().unwrap();
     let bits = |set: Vec<f64>| set.into_iter().map(f64::to_bits).collect();
     let fixed = (0..plan.sets().len()).map(|set| bits(reader.fixed_direct(set).unwrap())).collect();
     (reader.tally().unwrap(), fixed)

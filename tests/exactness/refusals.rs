@@ -110,7 +110,7 @@ fn foreign_and_misplaced_checkpoints_are_refused() {
 /// what a machine that computes differently would write.
 fn write_diverging(from: &Path, to: &Path, batch: usize) {
     let plan = plan_in(from);
-    let mut reader = Reader::open(&from.join(checkpoint(SHARD)), &plan, SHARD).unwrap().unwrap();
+    let reader = Reader::open(&from.join(checkpoint(SHARD)), &plan, SHARD).unwrap().unwrap();
     let mut tally = reader.tally().unwrap();
     tally.digests[batch][0] ^= 1;
     let fixed: Vec<Vec<f64>> = (0..plan.sets().len()).map(|set| reader.fixed_direct(set).unwrap()).collect();

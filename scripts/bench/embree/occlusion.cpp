@@ -95,16 +95,17 @@ class Embree {
         call<void>("rtcSetSceneFlags", scene, robust ? ROBUST : 0);
         Handle mesh = call<Handle>("rtcNewGeometry", device_, int(TRIANGLES));
         size_t count = segments.corners.size();
-        void* corners = call<void*>("rtcSetNewGeometryBuffer", mesh, int(VERTICES), 0u, int(FLOAT3), sizeof(Vector), count);
-        std::copy(segments.corners.begin(), segments.corners.end(), static_cast<Vector*>(corners));
-        void* indices = call<void*>("rtcSetNewGeometryBuffer", mesh, int(INDICES), 0u, int(UINT3), size_t(12), count / 3);
-        for (size_t i = 0; i < count; i++) static_cast<uint32_t*>(indices)[i] = uint32_t(i);
+        auto* corners = static_cast<Vector*>(buffer(mesh, VERTICES, FLOAT3, sizeof(Vector), count));
+        std::copy(segments.corners.begin(), segments.corners.end(), corners);
+        auto* indices = static_cast<uint32_t*>(buffer(mesh, INDICES, UINT3, 3 * sizeof(uint32_t), count / 3));
+        for (size_t i = 0; i < count; i++) indices[i] = uint32_t(i);
         call<void>("rtcSetGeometryBuildQuality", mesh, int(quality));
         call<void>("rtcCommitGeometry", mesh);
         call<unsigned>("rtcAttachGeometry", scene, mesh);
         call<void>("rtcReleaseGeometry", mesh);
         call<void>("rtcCommitScene", scene);
-        if (int error = call<int>("rtcGetDeviceError", device_)) throw std::runtime_error("Embree error " + std::to_string(error));
+        int error = call<int>("rtcGetDeviceError", device_);
+        if (error) throw std::runtime_error("Embree error " + std::to_string(error));
         return scene;
     }
 
@@ -131,6 +132,10 @@ class Embree {
     int version_;
     void* library_;
     Handle device_;
+
+    void* buffer(Handle mesh, int kind, int format, size_t stride, size_t count) const {
+        return call<void*>("rtcSetNewGeometryBuffer", mesh, kind, 0u, format, stride, count);
+    }
 
     void* find(const char* name) const {
         void* symbol = dlsym(library_, name);
@@ -216,7 +221,8 @@ template <int N> size_t count_occluded(const Embree& embree, Handle scene, bool 
 }
 
 template <int N>
-void measure(const Embree& embree, Handle scene, const std::vector<Fan>& all, int repetitions, const std::string& label) {
+void measure(const Embree& embree, Handle scene, const std::vector<Fan>& all, int repetitions,
+             const std::string& label) {
     size_t rays = 0;
     for (const Fan& fan : all) rays += fan.count;
     for (bool coherent : {false, true}) {
@@ -229,8 +235,8 @@ void measure(const Embree& embree, Handle scene, const std::vector<Fan>& all, in
         }
         std::sort(rates.begin(), rates.end());
         double middle = (rates[(rates.size() - 1) / 2] + rates[rates.size() / 2]) / 2;
-        std::printf("| %s | %d | %s | %.1f | %.1f | %zu of %zu |\n", label.c_str(), N, coherent ? "yes" : "no", rates.back(),
-                    middle, count, rays);
+        std::printf("| %s | %d | %s | %.1f | %.1f | %zu of %zu |\n", label.c_str(), N, coherent ? "yes" : "no",
+                    rates.back(), middle, count, rays);
         std::fflush(stdout);
     }
 }

@@ -11,6 +11,7 @@
 //! A file is untrusted: nothing is allocated before its length is checked against the size of the file, nothing is
 //! decoded before its checksum agrees, and nothing decoded is used before its shape is that of the plan.
 
+mod columns;
 mod read;
 mod write;
 

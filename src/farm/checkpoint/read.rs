@@ -1,15 +1,22 @@
 //! Checkpoint file -> header, blocks, tally.
 
-use super::{Checksum, Content, Header, MAGIC, MAX_HEADER, PREAMBLE, VERSION};
+use super::columns::{decode_moments, decode_replicates};
+use super::{Checksum, Content, Header, MAGIC, MAX_HEADER, PREAMBLE, Section, VERSION};
 use super::{block_count, block_range, checksum, layout};
 use crate::error::{Error, Result};
 use crate::farm::plan::Plan;
 use crate::job::{Kept, SetShape};
 use crate::tally::{FLUX_BINS, MomentBlock, Moments, Monitor, Replicates, SetTally, Tally};
+use nix::fcntl::{PosixFadviseAdvice, posix_fadvise};
 use serde::de::DeserializeOwned;
 use std::fs::File;
-use std::io::{self, ErrorKind, Read, Seek, SeekFrom};
+use std::io::{self, ErrorKind, Read};
+use std::ops::Range;
+use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
+
+/// As much as the system reads at one wish \[bytes\].
+const STRIDE: u64 = 1 << 20;
 
 /// An open checkpoint of a known plan and shard, its header checked.
 #[derive(Debug)]
@@ -58,45 +65,47 @@ impl Reader {
     ///
     /// # Errors
     /// [`Error::Refused`] for damage; [`Error::Io`].
-    pub fn moments(&mut self, set: usize, block: u32) -> Result<MomentBlock> {
-        let shape = self.shapes[set].clone();
+    pub fn moments(&self, set: usize, block: u32) -> Result<MomentBlock> {
+        let shape = &self.shapes[set];
         let colour = shape.kept == Kept::Moments { colour: true };
-        let bins = block_range(&shape, block).len();
-        self.section(Content::Moments { set: number(set), block }, |b: &MomentBlock| b.has_shape(bins, colour))
+        let bins = block_range(shape, block).len();
+        let content = Content::Moments { set: number(set), block };
+        self.section(content, decode_moments, |b| b.has_shape(bins, colour))
     }
 
     /// Every batch's score of a set.
     ///
     /// # Errors
     /// [`Error::Refused`] for damage; [`Error::Io`].
-    pub fn replicates(&mut self, set: usize) -> Result<Replicates> {
+    pub fn replicates(&self, set: usize) -> Result<Replicates> {
         let (bins, batches) = (self.shapes[set].bins(), self.header.batches());
-        self.section(Content::Replicates { set: number(set) }, |r: &Replicates| r.has_shape(bins, batches))
+        self.section(Content::Replicates { set: number(set) }, decode_replicates, |r| r.has_shape(bins, batches))
     }
 
     /// The flux balance, every batch.
     ///
     /// # Errors
     /// [`Error::Refused`] for damage; [`Error::Io`].
-    pub fn flux(&mut self) -> Result<Replicates> {
+    pub fn flux(&self) -> Result<Replicates> {
         let batches = self.header.batches();
-        self.section(Content::Flux, |r: &Replicates| r.has_shape(FLUX_BINS.len(), batches))
+        self.section(Content::Flux, decode_replicates, |r| r.has_shape(FLUX_BINS.len(), batches))
     }
 
     /// Direct light of a set that is the same in every batch; empty for zero everywhere.
     ///
     /// # Errors
     /// [`Error::Refused`] for damage; [`Error::Io`].
-    pub fn fixed_direct(&mut self, set: usize) -> Result<Vec<f64>> {
+    pub fn fixed_direct(&self, set: usize) -> Result<Vec<f64>> {
         let bins = self.shapes[set].bins();
-        self.section(Content::FixedDirect { set: number(set) }, |v: &Vec<f64>| v.is_empty() || v.len() == bins)
+        let fits = |v: &Vec<f64>| v.is_empty() || v.len() == bins;
+        self.section(Content::FixedDirect { set: number(set) }, decode, fits)
     }
 
     /// The monitored bins of a set, in their order; none where nothing is monitored.
     ///
     /// # Errors
     /// [`Error::Refused`] for damage; [`Error::Io`].
-    pub fn monitors(&mut self, set: usize) -> Result<Vec<Monitor>> {
+    pub fn monitors(&self, set: usize) -> Result<Vec<Monitor>> {
         let (bins, batches) = (self.shapes[set].monitored.clone(), self.header.batches());
         if bins.is_empty() {
             return Ok(Vec::new());
@@ -104,7 +113,7 @@ impl Reader {
         let fits = |m: &Vec<Monitor>| {
             m.len() == bins.len() && m.iter().zip(&bins).all(|(monitor, &bin)| monitor.has_shape(bin, batches))
         };
-        self.section(Content::Monitors { set: number(set) }, fits)
+        self.section(Content::Monitors { set: number(set) }, decode, fits)
     }
 
     /// Checksums of the sections of fixed direct light, in set order: equal exactly when the light is.
@@ -117,13 +126,13 @@ impl Reader {
     ///
     /// # Errors
     /// [`Error::Refused`] for damage; [`Error::Io`].
-    pub fn tally(&mut self) -> Result<Tally> {
+    pub fn tally(&self) -> Result<Tally> {
         let sets = (0..self.shapes.len()).map(|set| self.set_tally(set)).collect::<Result<_>>()?;
         let monitors = (0..self.shapes.len()).map(|set| self.monitors(set)).collect::<Result<_>>()?;
         Ok(Tally { sets, monitors, flux: self.flux()?, digests: self.header.digests.clone() })
     }
 
-    fn set_tally(&mut self, set: usize) -> Result<SetTally> {
+    fn set_tally(&self, set: usize) -> Result<SetTally> {
         let shape = self.shapes[set].clone();
         let Kept::Moments { colour } = shape.kept else { return Ok(SetTally::Replicates(self.replicates(set)?)) };
         let mut moments = Moments { n: self.header.batches(), bins: MomentBlock::new(0, colour) };
@@ -133,17 +142,38 @@ impl Reader {
         Ok(SetTally::Moments(moments))
     }
 
+    /// Asks the system to fetch `blocks` of a set from the disk, without waiting for them. Only a wish: where it is not
+    /// heard, whoever reads a block waits.
+    pub fn fetch(&self, set: usize, blocks: Range<u32>) {
+        let section = |block: u32| self.header.sections[self.position(Content::Moments { set: number(set), block })];
+        let Some(last) = blocks.clone().last().map(section) else { return };
+        for at in (section(blocks.start).offset..last.offset + last.bytes).step_by(STRIDE as usize) {
+            let (at, length) = ((self.base + at) as i64, STRIDE as i64);
+            let _ = posix_fadvise(&self.file, at, length, PosixFadviseAdvice::POSIX_FADV_WILLNEED);
+        }
+    }
+
     /// Reads, verifies and decodes the section holding `content`.
-    fn section<T: DeserializeOwned>(&mut self, content: Content, fits: impl Fn(&T) -> bool) -> Result<T> {
+    fn section<T>(
+        &self,
+        content: Content,
+        decode: impl Fn(&[u8]) -> Option<T>,
+        fits: impl Fn(&T) -> bool,
+    ) -> Result<T> {
         let section = self.header.sections[self.position(content)];
-        let sought = self.file.seek(SeekFrom::Start(self.base + section.offset));
-        let bytes = sought.and_then(|_| read_exactly(&mut self.file, section.bytes));
-        let bytes = bytes.map_err(|e| Fault::from(e).at(&self.path))?;
+        let bytes = self.read(&section).map_err(|e| Fault::from(e).at(&self.path))?;
         if checksum(&bytes) != section.checksum {
             return Err(Error::refused(&self.path, format!("damaged: wrong checksum of {content:?}")));
         }
         let decoded = decode(&bytes).filter(|t| fits(t));
         decoded.ok_or_else(|| Error::refused(&self.path, format!("damaged: {content:?} is not of the plan's shape")))
+    }
+
+    /// The bytes of `section`, a length already checked against the size of the file.
+    fn read(&self, section: &Section) -> io::Result<Vec<u8>> {
+        let mut bytes = zeros(section.bytes)?;
+        self.file.read_exact_at(&mut bytes, self.base + section.offset)?;
+        Ok(bytes)
     }
 
     /// Where `content` stands in the table, which was checked to be the layout of the plan.
@@ -258,10 +288,14 @@ fn check_sections(header: &Header, available: u64) -> std::result::Result<(), St
 
 /// Exactly `length` bytes, a length already checked against the size of the file.
 fn read_exactly(file: &mut File, length: u64) -> io::Result<Vec<u8>> {
-    let length = usize::try_from(length).map_err(|_| io::Error::from(ErrorKind::OutOfMemory))?;
-    let mut bytes = vec![0; length];
+    let mut bytes = zeros(length)?;
     file.read_exact(&mut bytes)?;
     Ok(bytes)
+}
+
+fn zeros(length: u64) -> io::Result<Vec<u8>> {
+    let length = usize::try_from(length).map_err(|_| io::Error::from(ErrorKind::OutOfMemory))?;
+    Ok(vec![0; length])
 }
 
 /// All of `bytes` as one value: a prefix is not enough. A hostile length inside cannot allocate much: serde

@@ -22,7 +22,7 @@ fn folder() -> (tempfile::TempDir, Folder) {
 
 /// Everything in the file; an error where any byte of it is refused.
 fn read_all(path: &Path, plan: &Plan) -> Result<(Tally, Vec<Vec<f64>>)> {
-    let mut reader = Reader::open(path, plan, 1)?.expect("the file exists");
+    let reader = Reader::open(path, plan, 1)?.expect("the file exists");
     let fixed = (0..plan.sets().len()).map(|set| reader.fixed_direct(set)).collect::<Result<_>>()?;
     Ok((reader.tally()?, fixed))
 }

@@ -1,5 +1,6 @@
 //! Tally -> checkpoint file.
 
+use super::columns::{encode_moments, encode_replicates};
 use super::{Checksum, Content, Header, MAGIC, Section, VERSION, block_range, checksum, layout, read_header};
 use crate::error::{Error, Result};
 use crate::farm::durable;
@@ -98,14 +99,14 @@ fn encode(content: Content, snapshot: &Snapshot, shapes: &[SetShape]) -> Vec<u8>
     let sets = &snapshot.tally.sets;
     let encoded = match content {
         Content::Moments { set, block } => match &sets[set as usize] {
-            SetTally::Moments(m) => postcard::to_stdvec(&m.bins.slice(block_range(&shapes[set as usize], block))),
+            SetTally::Moments(m) => return encode_moments(&m.bins, block_range(&shapes[set as usize], block)),
             SetTally::Replicates(_) => unreachable!("the layout follows what the set keeps"),
         },
         Content::Replicates { set } => match &sets[set as usize] {
-            SetTally::Replicates(r) => postcard::to_stdvec(r),
+            SetTally::Replicates(r) => return encode_replicates(r),
             SetTally::Moments(_) => unreachable!("the layout follows what the set keeps"),
         },
-        Content::Flux => postcard::to_stdvec(&snapshot.tally.flux),
+        Content::Flux => return encode_replicates(&snapshot.tally.flux),
         Content::FixedDirect { set } => postcard::to_stdvec(&snapshot.fixed_direct[set as usize]),
         Content::Monitors { set } => postcard::to_stdvec(&snapshot.tally.monitors[set as usize]),
     };

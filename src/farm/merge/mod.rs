@@ -2,7 +2,9 @@
 //!
 //! Of each shard the longest checkpoint counts, once the batch digests show the others to be its prefixes; so
 //! copies count once and the order of the folders changes nothing; plans that ask for other results are refused.
-//! Files are read one after the other, a block of bins at a time, so memory holds the result and one block. A file
+//! Files are read one after the other, a few blocks of bins at a time, so memory holds the result and these blocks,
+//! whatever the number of shards. Threads share the blocks of a file; every block is folded in shard order, so their number
+//! changes no bit. A file
 //! that cannot be trusted stops the merge and is named, with the reason; nothing here writes. Merging knows neither
 //! scene nor random numbers.
 //!
@@ -22,8 +24,13 @@ use crate::tally::statistics::Estimate;
 use crate::tally::{FLUX_BINS, MomentBlock, Monitor, Replicates};
 use choose::{Candidate, check_length, choose, common_plan};
 use goal::{Goal, Look, Stopped};
+use rayon::prelude::*;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+
+/// Blocks read, verified and merged at a time: some 10 MB, so that the threads have enough to share, and memory holds
+/// little beside the result.
+const AT_ONCE: u32 = 64;
 
 /// The result of one receiver set.
 #[derive(Clone, Debug, PartialEq)]
@@ -133,7 +140,7 @@ struct Fold<'a> {
     looks: Vec<Look>,
 }
 
-/// One receiver set so far: maps as blocks, others whole.
+/// One receiver set so far: maps as blocks, empty before the first file; others whole.
 enum SetFold {
     Moments(Vec<MomentBlock>),
     Replicates(Replicates),
@@ -153,7 +160,7 @@ impl<'a> Fold<'a> {
     fn new(plan: &'a Plan, read: Vec<usize>) -> Self {
         let shapes = plan.sets();
         let empty = |shape: &SetShape| match shape.kept {
-            Kept::Moments { .. } => SetFold::Moments(Vec::new()),
+            Kept::Moments { .. } => SetFold::Moments(vec![MomentBlock::default(); block_count(shape) as usize]),
             Kept::EveryBatch => SetFold::Replicates(Replicates::new(shape.bins())),
         };
         let sets = shapes.iter().map(empty).collect();
@@ -168,19 +175,17 @@ impl<'a> Fold<'a> {
     fn take(&mut self, file: &Candidate) -> Result<()> {
         let shard = file.header.shard;
         let gone = || Error::refused(&file.path, "changed while it was merged");
-        let mut reader = Reader::open(&file.path, self.plan, shard)?.ok_or_else(gone)?;
+        let reader = Reader::open(&file.path, self.plan, shard)?.ok_or_else(gone)?;
         // A worker may have replaced it meanwhile: by a longer one, then.
         if !reader.header().digests.starts_with(&file.header.digests) {
             return Err(gone());
         }
         check_length(self.plan, shard, &file.path, reader.header())?;
         let n = reader.header().batches();
-        self.take_fixed(&mut reader, &file.path)?;
+        self.take_fixed(&reader, &file.path)?;
         for &set in &self.read {
             match &mut self.sets[set] {
-                SetFold::Moments(blocks) => {
-                    take_blocks(blocks, &mut reader, set, &self.shapes[set], (self.batches, n))?
-                }
+                SetFold::Moments(blocks) => take_blocks(blocks, &reader, set, (self.batches, n))?,
                 SetFold::Replicates(scores) => scores.append(reader.replicates(set)?),
             }
             let next = reader.monitors(set)?;
@@ -195,7 +200,7 @@ impl<'a> Fold<'a> {
     }
 
     /// Takes the direct light of the first file, and refuses a file with another.
-    fn take_fixed(&mut self, reader: &mut Reader, path: &Path) -> Result<()> {
+    fn take_fixed(&mut self, reader: &Reader, path: &Path) -> Result<()> {
         let checksums = reader.fixed_direct_checksums();
         match &self.fixed {
             None => {
@@ -260,20 +265,26 @@ impl<'a> Fold<'a> {
     }
 }
 
-/// Merges the blocks of one map over `n` = (batches so far, batches of this file).
-fn take_blocks(
-    blocks: &mut Vec<MomentBlock>,
-    reader: &mut Reader,
-    set: usize,
-    shape: &SetShape,
-    n: (u64, u64),
-) -> Result<()> {
-    for block in 0..block_count(shape) {
-        let next = reader.moments(set, block)?;
-        match blocks.get_mut(block as usize) {
-            Some(sum) => sum.merge(n.0, &next, n.1),
-            None => blocks.push(next),
-        }
+/// Merges the blocks of one map over `n` = (batches so far, batches of this file), some at a time by all threads, while
+/// the disk fetches the next ones.
+fn take_blocks(blocks: &mut [MomentBlock], reader: &Reader, set: usize, n: (u64, u64)) -> Result<()> {
+    let all = blocks.len() as u32;
+    reader.fetch(set, 0..AT_ONCE.min(all));
+    for (some, start) in blocks.chunks_mut(AT_ONCE as usize).zip((0..all).step_by(AT_ONCE as usize)) {
+        let next = start + some.len() as u32;
+        reader.fetch(set, next..(next + AT_ONCE).min(all));
+        let take = |(sum, block): (&mut MomentBlock, u32)| {
+            let of_file = reader.moments(set, block)?;
+            if sum.is_empty() {
+                *sum = of_file
+            } else {
+                sum.merge(n.0, &of_file, n.1)
+            }
+            Ok(())
+        };
+        let taken: Vec<Result<()>> = some.par_iter_mut().zip(start..next).map(take).collect();
+        // Of several damaged blocks the first is named, whichever thread came upon it first.
+        taken.into_iter().collect::<Result<()>>()?;
     }
     Ok(())
 }

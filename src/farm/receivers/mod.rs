@@ -5,20 +5,24 @@
 //! without extent is computed once. How histories are turned into scores is in [`super::local`].
 
 mod horizon;
+mod sense;
 mod sight;
 
+pub use sense::Sensed;
 pub use sight::CentreSight;
 
 mod crossing;
 mod reverse;
 
 use crate::error::{Error, Result};
-use crate::job::{Camera, Grid, Job, Point, SetShape};
+use crate::geometry::Ray;
+use crate::job::{Camera, Grid, Job, Point, Sampling, SetShape};
 use crate::math::{DVec2, DVec3};
 use crate::photometry::Colour;
+use crate::random::sobol::PointSet;
 use crate::random::{Domain, Generator, Stream};
 use crate::scene::Scene;
-use crate::transport::direct::{emitter_samples, from_emitters, from_lights};
+use crate::transport::direct::from_lights;
 use crate::transport::eye::{Eye, Gaze, latitude};
 use crate::transport::receiver::{Receiver, Response, Seen, look, look_at};
 use horizon::Sight;
@@ -28,9 +32,15 @@ pub struct ReceiverSet {
     shape: SetShape,
     bins: Bins,
     stream: Stream,
+    /// Of the points of emitters that receivers share.
+    emitters: Stream,
     /// Of the receiver-side continuations.
     continuations: Stream,
+    /// Of the directions in which they start.
+    directions: Stream,
     histories: u64,
+    /// Whether the job asks for quasi-random histories: continuations follow.
+    quasi_random: bool,
     /// b of the bounded kernel \[1/m2\]; infinite where nothing is bounded.
     bound: f64,
     /// Where each bin lies, of a surface point seen from all directions; empty for others.
@@ -48,14 +58,23 @@ enum Bins {
 /// Draws after which a bin across the horizon is taken to show nothing of what lies above.
 const DRAWS: u32 = 1 << 16;
 
-/// What the positions of one bin say in one batch.
-pub struct Sensed {
-    /// Emission and sampled direct light \[lx or cd/m2\].
-    pub direct: Colour,
-    /// Where the histories are connected to.
-    pub receiver: Option<Receiver>,
-    /// Whether a surface that reflects was there.
-    pub existed: bool,
+/// Random numbers of the paths that continue one bin in one batch: in a quasi-random job, where their number is a power of two,
+/// they start with the points of a scrambled quasi-random set, so that their directions do not leave a part of the hemisphere out.
+pub struct Paths {
+    rng: Generator,
+    points: Option<PointSet>,
+    next: u32,
+}
+
+impl Paths {
+    /// The numbers of the next path.
+    pub fn next(&mut self) -> &mut Generator {
+        if let Some(points) = &self.points {
+            self.rng = self.rng.clone().after(points.point(self.next));
+            self.next += 1;
+        }
+        &mut self.rng
+    }
 }
 
 impl ReceiverSet {
@@ -86,9 +105,23 @@ impl ReceiverSet {
 
     fn new(job: &Job, shape: SetShape, bins: Bins, bound: f64) -> Self {
         let stream = Stream::new(job.run.seed, Domain::Receiver, &shape.name);
+        let emitters = Stream::new(job.run.seed, Domain::Emitter, &shape.name);
         let continuations = Stream::new(job.run.seed, Domain::Continuation, &shape.name);
+        let directions = Stream::new(job.run.seed, Domain::Direction, &shape.name);
         let histories = job.run.histories_per_batch;
-        let mut set = ReceiverSet { shape, bins, stream, continuations, histories, bound, sights: Vec::new() };
+        let quasi_random = job.run.sampling == Sampling::Rqmc;
+        let mut set = ReceiverSet {
+            shape,
+            bins,
+            stream,
+            emitters,
+            continuations,
+            directions,
+            histories,
+            quasi_random,
+            bound,
+            sights: Vec::new(),
+        };
         if let Bins::Film { eye: eye @ Eye::Surface { point }, .. } = &set.bins {
             set.sights = (0..set.shape.bins()).map(|i| set.sight(eye, point.normal, i)).collect();
         }
@@ -105,9 +138,12 @@ impl ReceiverSet {
         self.bound
     }
 
-    /// The generator of the continuations of bin `bin` in a batch.
-    pub fn continuation(&self, bin: u32, batch: u64) -> Generator {
-        self.continuations.generator(batch * self.shape.bins() as u64 + u64::from(bin))
+    /// The paths that continue bin `bin` in a batch, `count` in number.
+    pub fn continuations(&self, bin: u32, batch: u64, count: usize) -> Paths {
+        let index = batch * self.shape.bins() as u64 + u64::from(bin);
+        let points = (self.quasi_random && count.is_power_of_two())
+            .then(|| PointSet::new(&self.directions, index, count.ilog2()));
+        Paths { rng: self.continuations.generator(index), points, next: 0 }
     }
 
     /// Where the centre of bin `i` looks, for the order of the tiles alone; infinite where nothing is seen.
@@ -190,7 +226,8 @@ impl ReceiverSet {
     }
 
     /// A film position of bin `bin`: in its stratum, or across the horizon anywhere in the bin, but above.
-    fn draw(&self, eye: &Eye, strata: u32, stratum: u32, bin: usize, rng: &mut Generator) -> DVec2 {
+    fn draw(&self, eye: &Eye, stratum: u32, bin: usize, rng: &mut Generator) -> DVec2 {
+        let strata = self.positions().isqrt();
         if self.sights.get(bin) != Some(&Sight::Across) {
             return self.film(bin, strata, stratum, rng.uniform2());
         }
@@ -211,47 +248,18 @@ impl ReceiverSet {
             Bins::Film { eye, strata } => {
                 let mut rng = self.stream.generator(bin as u64);
                 let stratum = rng.below(strata * strata);
-                let film = self.draw(eye, *strata, stratum, bin, &mut rng);
+                let film = self.draw(eye, stratum, bin, &mut rng);
                 gaze(scene, eye, film, &mut rng).receiver
             }
         }
     }
+}
 
-    /// Direct light and receiver of one bin in one batch.
-    pub fn sense(&self, scene: &Scene, bin: usize, batch: u64) -> Sensed {
-        let mut rng = self.stream.generator(batch * self.shape.bins() as u64 + bin as u64);
-        match &self.bins {
-            Bins::Meters(meters) => self.sense_meter(scene, meters[bin].as_ref(), &mut rng),
-            Bins::Film { eye, strata } => self.sense_film(scene, eye, *strata, bin, &mut rng),
-        }
-    }
-
-    fn sense_meter(&self, scene: &Scene, meter: Option<&Receiver>, rng: &mut Generator) -> Sensed {
-        let samples = emitter_samples(self.histories);
-        let direct = meter.map_or(Colour::BLACK, |r| from_emitters(scene, r, samples, rng));
-        // In a scene without reflection there is nothing to wait for beyond direct light.
-        Sensed { direct, receiver: meter.copied(), existed: meter.is_some() && scene.reflects() }
-    }
-
-    fn sense_film(&self, scene: &Scene, eye: &Eye, strata: u32, bin: usize, rng: &mut Generator) -> Sensed {
-        let positions = strata * strata;
-        let samples = emitter_samples(self.histories).div_ceil(u64::from(positions));
-        let carrying = rng.below(positions);
-        let mut sensed = Sensed { direct: Colour::BLACK, receiver: None, existed: false };
-        for stratum in 0..positions {
-            let film = self.draw(eye, strata, stratum, bin, rng);
-            let seen = gaze(scene, eye, film, rng);
-            sensed.direct += seen.emitted;
-            if let Some(receiver) = &seen.receiver {
-                sensed.direct += from_lights(scene, receiver) + from_emitters(scene, receiver, samples, rng);
-                sensed.existed = true;
-            }
-            if stratum == carrying {
-                sensed.receiver = seen.receiver;
-            }
-        }
-        sensed.direct = sensed.direct / f64::from(positions);
-        sensed
+/// The ray to follow, where there is one.
+fn gaze_ray(gaze: &Gaze) -> Option<Ray> {
+    match gaze {
+        Gaze::Along(ray) => Some(*ray),
+        Gaze::At(..) | Gaze::Nowhere => None,
     }
 }
 

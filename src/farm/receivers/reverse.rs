@@ -53,8 +53,8 @@ impl ReceiverSet {
     fn look_from(&self, scene: &Scene, bin: usize, stratum: u32, rng: &mut Generator) -> (Colour, Option<Receiver>) {
         match &self.bins {
             Bins::Meters(meters) => (Colour::BLACK, meters[bin]),
-            Bins::Film { eye, strata } => {
-                let film = self.draw(eye, *strata, stratum, bin, rng);
+            Bins::Film { eye, .. } => {
+                let film = self.draw(eye, stratum, bin, rng);
                 let seen = gaze(scene, eye, film, rng);
                 let lit = seen.receiver.map_or(Colour::BLACK, |r| lights_at(scene, &r));
                 (seen.emitted + lit, seen.receiver)

@@ -54,7 +54,7 @@ impl Case {
         vector[axis] = match n.below(3) {
             0 => f32::from_bits(vector[axis].to_bits() ^ (n.bits() & ((1 << step) - 1))),
             1 => vector[axis] * (1.0 + 0.1 * n.signed()),
-            _ => vector[axis] + n.signed() * 2f32.powi(-(step as i32)),
+            _ => vector[axis] + n.signed() * f32::from_bits((127 - step as u32) << 23),
         };
         self
     }
@@ -91,9 +91,9 @@ impl Kernel for Judge {
         planes.store(&mut rows);
         let ray = [I::Sixteen::splat(d.x), I::Sixteen::splat(d.y), I::Sixteen::splat(d.z)];
         let single = rows.test::<I>(0, &ray);
-        let against = planes.against(&directions);
-        let (hit, miss) =
-            (single.hit | against.cover & 1, single.miss | !against.may & 1 | !planes.along(d.into()) & 1);
+        let (against, alone) = (planes.against(&directions), planes.test(d.to_array()));
+        let hit = single.hit | alone.hit | against.cover;
+        let miss = single.miss | alone.miss | !against.may | !planes.toward(&directions);
         let crosses = Triangle::new(corners).crosses(apex.as_dvec3(), d.as_dvec3());
         let contradicted = if crosses { miss & 1 == 1 } else { hit & 1 == 1 };
         (errors::<I>(&self.0, &rows, &ray), contradicted)

@@ -1,0 +1,101 @@
+//! What receivers are connected to: the vertices of histories, or points of emitters, as the kernel wants them.
+
+use super::trajectory::Vertex;
+use crate::math::{DVec3, PI, Vec3};
+use crate::photometry::Colour;
+use crate::scene::Scene;
+use std::ops::Range;
+
+/// A vertex as the kernel wants it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Connector {
+    pub(super) position: Vec3,
+    pub(super) lifted: Vec3,
+    pub(super) normal: Vec3,
+    /// W_n rho / pi of a Lambert vertex \[lm/sr\].
+    pub(super) intensity: [f32; 3],
+    /// n, the reflections that light scattered here has seen.
+    pub(super) order: u32,
+    /// True where the bound does not apply.
+    pub(super) after_delta: bool,
+    /// The vertex itself where the law of reflection depends on direction.
+    pub(super) glossy: Option<Vertex>,
+    /// Number of the emitter of which this is a point and no vertex.
+    pub(super) emitter: Option<u32>,
+}
+
+/// A point of an emitter, as the start of light to many receivers.
+#[derive(Clone, Copy, Debug)]
+pub struct LitPoint {
+    /// Position \[m\].
+    pub position: DVec3,
+    /// Unit normal of the side that emits.
+    pub normal: DVec3,
+    /// Luminous intensity along the normal \[cd\].
+    pub intensity: Colour,
+    /// Number of the emitter.
+    pub emitter: u32,
+}
+
+/// The vertices of many histories, ready to be connected.
+#[derive(Debug, Default)]
+pub struct Connectors {
+    all: Vec<Connector>,
+    /// True when some vertex was lit straight by a delta scatterer.
+    mirrored: bool,
+    /// End of each history in `all`.
+    ends: Vec<usize>,
+}
+
+impl Connectors {
+    /// Appends the vertices of the next history.
+    pub fn push(&mut self, scene: &Scene, history: &[Vertex]) {
+        self.all.extend(history.iter().map(|v| connector(scene, v)));
+        self.mirrored |= history.iter().any(|v| v.after_delta);
+        self.ends.push(self.all.len());
+    }
+
+    /// Appends points of emitters in the place of the vertices of a history; no reflection counts.
+    pub fn push_lit(&mut self, scene: &Scene, points: &[LitPoint]) {
+        self.all.extend(points.iter().map(|p| Connector {
+            position: p.position.as_vec3(),
+            lifted: scene.geometry.lift(p.position, p.normal).as_vec3(),
+            normal: p.normal.as_vec3(),
+            intensity: p.intensity.0.map(|c| c as f32),
+            order: 0,
+            after_delta: false,
+            glossy: None,
+            emitter: Some(p.emitter),
+        }));
+        self.ends.push(self.all.len());
+    }
+
+    /// Number of histories, those without vertices included.
+    pub fn histories(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// Number of vertices.
+    pub fn vertices(&self) -> usize {
+        self.all.len()
+    }
+
+    pub(super) fn iter(&self, histories: Range<usize>) -> impl Iterator<Item = &[Connector]> {
+        let mut start = histories.start.checked_sub(1).map_or(0, |before| self.ends[before]);
+        self.ends[histories].iter().map(move |&end| &self.all[std::mem::replace(&mut start, end)..end])
+    }
+}
+
+fn connector(scene: &Scene, v: &Vertex) -> Connector {
+    let lambert = scene.surface(v.primitive).reflectance.lambert();
+    Connector {
+        position: v.position.as_vec3(),
+        lifted: scene.geometry.lift(v.position, v.normal).as_vec3(),
+        normal: v.normal.as_vec3(),
+        intensity: (v.weight * lambert.unwrap_or(Colour::BLACK) / PI).0.map(|c| c as f32),
+        order: v.order,
+        after_delta: v.after_delta,
+        glossy: lambert.is_none().then_some(*v),
+        emitter: None,
+    }
+}

@@ -1,0 +1,163 @@
+//! Direct light at many receivers at once: lamps and points of emitters are apexes of the visibility kernel, like vertices.
+//!
+//! ```text
+//! E_0(r) = sum_j I_j(r) cos/d^2 V(j, r)  +  1/n sum_i L_e A_e / P_e  G(y_i, r),   y_i uniform on emitter e, chosen with P_e
+//! ```
+//!
+//! The points y_i are those of a scrambled quasi-random set, drawn anew for each batch, and shared by all receivers of a set: one
+//! visibility tile costs little more than one ray. Their light is bounded by no solid angle, so a receiver within a length of
+//! the longest edge of an emitter does not take part in them, nor does one with a peaked response: it has samples of its own
+//! ([`super::direct`]). Who takes part depends on places alone, so both are unbiased.
+
+use super::connection::{Connectors, Link, LitPoint, Rule, Tile, connect};
+use super::direct::{from_emitters, from_some_emitters};
+use super::receiver::Receiver;
+use crate::geometry::Ray;
+use crate::geometry::visibility::{BUNDLE, BUNDLES, Lanes, Points, Scratch};
+use crate::math::{DVec2, DVec3, Vec3};
+use crate::photometry::Colour;
+use crate::random::Generator;
+use crate::random::sobol::PointSet;
+use crate::scene::{Emitter, Light, Scene};
+use std::ops::Range;
+
+/// Nearer than this to the centre, in lengths of its longest edge, an emitter is sampled for each receiver alone.
+const NEAR: f64 = 1.0;
+/// Points whose light is summed in f32 before it goes into f64.
+pub const TOGETHER: usize = 16;
+
+/// `count` points of the emitters of `scene`, a power of two, to be shared by receivers.
+pub fn lit_points(scene: &Scene, set: &PointSet, count: u32) -> Connectors {
+    let mut connectors = Connectors::default();
+    if scene.sources.emitters.is_empty() {
+        return connectors;
+    }
+    for first in (0..count).step_by(TOGETHER) {
+        let run = first..(first + TOGETHER as u32).min(count);
+        let points: Vec<LitPoint> = run.flat_map(|i| lit_point(scene, set, i, count)).collect();
+        connectors.push_lit(scene, &points);
+    }
+    connectors
+}
+
+/// Point number `i` of `count`, on both sides of an emitter that has two.
+fn lit_point(scene: &Scene, set: &PointSet, i: u32, count: u32) -> impl Iterator<Item = LitPoint> {
+    let [choice, x, y, ..] = set.point(i);
+    let (number, probability) = scene.sources.choose_number(choice);
+    let emitter = &scene.sources.emitters[number];
+    let position = emitter.point(DVec2::new(x, y));
+    let intensity = emitter.luminance * (emitter.area / (probability * f64::from(count)));
+    let lit = move |normal: DVec3| LitPoint { position, normal, intensity, emitter: number as u32 };
+    let sides = if emitter.double_sided { 2 } else { 1 };
+    [emitter.normal, -emitter.normal].into_iter().take(sides).map(lit)
+}
+
+/// Points of emitters that receivers share.
+#[derive(Clone, Debug)]
+pub struct Shared<'a> {
+    /// All points that were drawn together.
+    pub points: &'a Connectors,
+    /// Which runs of [`TOGETHER`] of them are used.
+    pub some: Range<usize>,
+    /// One over the share of them that is used.
+    pub weight: f64,
+}
+
+impl<'a> Shared<'a> {
+    /// All `points`.
+    pub fn all(points: &'a Connectors) -> Self {
+        Shared { points, some: 0..points.histories(), weight: 1.0 }
+    }
+
+    /// The run number `run`.
+    pub fn run(points: &'a Connectors, run: usize) -> Self {
+        Shared { points, some: run..run + 1, weight: points.histories() as f64 }
+    }
+}
+
+/// Direct light at `receivers`, at most a tile, each with its generator, times their responses \[lx or cd/m2\]: exact from lights
+/// without extent where `lights` asks for it, from emitters by the shared points, or by `samples` of its own.
+pub fn direct_light(
+    scene: &Scene,
+    receivers: &mut [(Receiver, &mut Generator)],
+    Shared { points, some, weight }: Shared,
+    samples: u64,
+    (lights, channels): (bool, usize),
+) -> Vec<Colour> {
+    let places: Vec<Receiver> = receivers.iter().map(|(r, _)| *r).collect();
+    let mut light = if lights { of_lights(scene, &places) } else { vec![Colour::BLACK; places.len()] };
+    if scene.sources.emitters.is_empty() {
+        return light;
+    }
+    let near = near_emitters(scene, &places);
+    let tile = Tile::new(scene, places.iter().map(link).collect(), 0);
+    let refused = near.iter().map(|(number, near)| (*number, near.clone()));
+    let rule = Rule { bound: f64::INFINITY, channels, orders: 0..1 };
+    let connected = connect(scene, points, some, &tile.refusing(refused), &rule);
+    for (i, (receiver, rng)) in receivers.iter_mut().enumerate() {
+        light[i] += if receiver.response.is_peaked() {
+            from_emitters(scene, receiver, samples, rng)
+        } else {
+            let own: Vec<u32> = near.iter().filter(|(_, near)| near[i]).map(|(number, _)| *number).collect();
+            connected[i].sum * weight + from_some_emitters(scene, receiver, &own, samples, rng)
+        };
+    }
+    light
+}
+
+fn link(receiver: &Receiver) -> Link {
+    Link { owner: 0, receiver: *receiver, start: Colour::BLACK, watched: false }
+}
+
+/// The emitters that are too near to some of the receivers, with the receivers.
+fn near_emitters(scene: &Scene, receivers: &[Receiver]) -> Vec<(u32, Vec<bool>)> {
+    let near = |(number, emitter): (u32, &Emitter)| {
+        let ([a, b, c], reach) = (emitter.corners, NEAR * NEAR * emitter.longest_edge_squared());
+        let middle = (a + b + c) / 3.0;
+        let is_near = |r: &Receiver| r.position.distance_squared(middle) < reach;
+        let near: Vec<bool> = receivers.iter().map(is_near).collect();
+        near.contains(&true).then_some((number, near))
+    };
+    scene.sources.numbered().filter_map(near).collect()
+}
+
+/// Light from point, spot and directional lights, times the responses.
+fn of_lights(scene: &Scene, receivers: &[Receiver]) -> Vec<Colour> {
+    let mut sums = vec![Colour::BLACK; receivers.len()];
+    let lifted: Vec<Vec3> = receivers.iter().map(|r| scene.geometry.lift(r.position, r.normal).as_vec3()).collect();
+    let points = Points::new(&scene.geometry, &lifted);
+    for light in &scene.sources.lights {
+        let arriving: Vec<_> = receivers.iter().map(|r| light.at(r.position)).collect();
+        let mut seen: Lanes = [0; BUNDLES];
+        for (i, (receiver, (_, w_in, across))) in receivers.iter().zip(&arriving).enumerate() {
+            // At the lamp itself the cosine is NaN, which is not above zero: no light instead of no number.
+            let lit = -receiver.normal.dot(*w_in) > 0.0 && !across.is_black();
+            seen[i / BUNDLE] |= u16::from(lit) << (i % BUNDLE);
+        }
+        match light {
+            Light::Directional { direction, .. } => shadow_of_parallel(scene, *direction, receivers, &mut seen),
+            Light::Omni { position, .. } | Light::Spot { position, .. } => {
+                scene.geometry.hide(position.as_vec3(), &points, &mut seen, &mut Scratch::default());
+            }
+        }
+        for (i, (receiver, (_, w_in, across))) in receivers.iter().zip(&arriving).enumerate() {
+            if seen[i / BUNDLE] >> (i % BUNDLE) & 1 == 1 {
+                let cosine = -receiver.normal.dot(*w_in);
+                sums[i] += *across * cosine * receiver.response.to(scene, receiver.normal, *w_in);
+            }
+        }
+    }
+    sums
+}
+
+/// Clears the bits of the receivers that something hides from parallel light.
+fn shadow_of_parallel(scene: &Scene, direction: DVec3, receivers: &[Receiver], seen: &mut Lanes) {
+    for (i, receiver) in receivers.iter().enumerate() {
+        let (bundle, lane) = (i / BUNDLE, i % BUNDLE);
+        let origin = scene.geometry.lift(receiver.position, receiver.normal);
+        let ray = Ray { origin, direction: -direction };
+        if seen[bundle] >> lane & 1 == 1 && scene.geometry.closest_hit(&ray).is_some() {
+            seen[bundle] &= !(1 << lane);
+        }
+    }
+}
