@@ -4,15 +4,20 @@
 //! inflated by more than any of their tests rounds, so no test of a box is ever wrong about a triangle inside: answers
 //! come from triangles alone.
 
+use super::pages;
 use crate::math::Vec3;
 use glam::Vec3A;
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::{Bvh2, builder::build_bvh2};
+use obvhs::ploc::PlocSearchDistance;
 use std::ops::Range;
 
 /// Children of a node, and triangles of a block.
 pub(super) const WIDTH: usize = 8;
+
+/// Triangles up to which the hierarchy is built with most care.
+const FEW: usize = 1 << 17;
 
 /// Eight boxes, each around a node or a block.
 #[derive(Clone, Debug)]
@@ -57,8 +62,8 @@ impl Bvh8 {
             Aabb::new(tight.min - margin, tight.max + margin)
         };
         let boxes: Vec<Aabb> = triangles.iter().map(inflated).collect();
-        let params = BvhBuildParams { max_prims_per_leaf: WIDTH as u32, ..BvhBuildParams::medium_build() };
-        Collapse::of(&build_bvh2(&boxes, params, &mut Default::default()))
+        let bvh = Collapse::of(&build_bvh2(&boxes, care(triangles.len()), &mut Default::default()));
+        Bvh8 { nodes: pages::collect(bvh.nodes.len(), bvh.nodes.into_iter()), ..bvh }
     }
 
     /// Places in `order` of the triangles of a block.
@@ -92,6 +97,16 @@ impl Bvh8 {
     pub(super) fn bytes(&self) -> usize {
         size_of_val(&self.nodes[..]) + size_of_val(&self.order[..]) + size_of_val(&self.firsts[..])
     }
+}
+
+/// How a hierarchy of `count` triangles is built. Most care gains 25 % of the kernel's speed in a room of 34 triangles; among a
+/// million it takes 1 s more and gains nothing over a wider search for neighbours, which gains 7 %.
+fn care(count: usize) -> BvhBuildParams {
+    let medium = BvhBuildParams::medium_build();
+    let (ploc_search_distance, search_depth_threshold) = (PlocSearchDistance::High, 2);
+    let wide = BvhBuildParams { ploc_search_distance, search_depth_threshold, ..medium };
+    let preset = if count <= FEW { BvhBuildParams::slow_build() } else { wide };
+    BvhBuildParams { max_prims_per_leaf: WIDTH as u32, pre_split: false, ..preset }
 }
 
 /// A binary hierarchy on its way into a wide one.

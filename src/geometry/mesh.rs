@@ -6,6 +6,7 @@
 //! edge meets both. Everything before that, in f32 and for many triangles at once, is conservative.
 
 use super::bvh::{Bvh8, WIDTH};
+use super::pages;
 use super::planes::Block;
 use super::ray::{Any, Closest};
 use super::simd::Path;
@@ -62,12 +63,12 @@ impl Mesh {
             place[primitive as usize] = at as u32;
         }
         let ordered = bvh.order.iter().map(|&p| Triangle { corners: triangles[p as usize], primitive: p });
-        let ordered: Vec<Triangle> = ordered.collect();
+        let ordered = pages::collect(triangles.len(), ordered);
         let block = |number: u32| {
             let corners: Vec<_> = ordered[bvh.block(number)].iter().map(|t| t.corners).collect();
             Block::new(&corners)
         };
-        let blocks = (0..bvh.firsts.len() as u32 - 1).map(block).collect();
+        let blocks = pages::collect(bvh.firsts.len() - 1, (0..bvh.firsts.len() as u32 - 1).map(block));
         let around = 0.01 * (bounds.1 - bounds.0).max_element();
         let near = (bounds.0 - around, bounds.1 + around);
         let floor = (size / (1u64 << 46) as f64) as f32;

@@ -15,6 +15,7 @@ mod bvh;
 mod mesh;
 mod ordering;
 mod packet;
+mod pages;
 mod plane;
 mod planes;
 mod points;

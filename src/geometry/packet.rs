@@ -149,7 +149,8 @@ impl<'a, I: Isa> Search<'a, I> {
         let mut ends = [f32::INFINITY; RAYS];
         ends.iter_mut().skip(rays.len()).for_each(|end| *end = -1.0);
         let shaft = Shaft::along(apex, directions.least, directions.most);
-        Search { mesh, apex, directions, shaft, d, bundle: Bundle::new(&d), work, ends, end: f32::INFINITY }
+        let bundle = Bundle::new(&shaft, &d);
+        Search { mesh, apex, directions, shaft, d, bundle, work, ends, end: f32::INFINITY }
     }
 
     #[inline(always)]
@@ -166,7 +167,7 @@ impl<'a, I: Isa> Search<'a, I> {
             }
             let Some((_, number, slot)) = self.work.open.pop(self.end) else { return self.finish(rays, hits) };
             let node = &self.mesh.bvh.nodes[number];
-            let met = self.bundle.meets_before(node, slot, self.apex, I::Sixteen::load(&self.ends)) & ALL;
+            let met = self.bundle.meets_before(node, slot, I::Sixteen::load(&self.ends)) & ALL;
             if met == 0 {
                 continue;
             }

@@ -219,6 +219,19 @@ impl<I: Isa> Planes<I> {
         !miss | self.doubtful
     }
 
+    /// The segment along `d` against all triangles.
+    #[inline(always)]
+    pub(super) fn test(&self, d: [f32; 3]) -> Decided {
+        let d = splat::<I>(d);
+        let [first, second, third] = &self.edges;
+        let inside = dot::<I>(*first, d).min(dot::<I>(*second, d)).min(dot::<I>(*third, d));
+        let beyond = dot::<I>(self.face, d).sub(self.volume);
+        let (edge, face) = (self.edge_tolerance, self.face_tolerance);
+        let miss = inside.less(I::Eight::splat(-edge)) | beyond.less(I::Eight::splat(-face));
+        let hit = I::Eight::splat(edge).less(inside) & I::Eight::splat(face).less(beyond);
+        Decided { miss: miss & !self.doubtful, hit: hit & !self.doubtful }
+    }
+
     /// To memory, from where single triangles are taken.
     #[inline(always)]
     pub(super) fn store(&self, rows: &mut Rows) {

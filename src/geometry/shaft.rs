@@ -2,7 +2,10 @@
 //!
 //! A segment o + t d, 0 <= t <= 1, with every coordinate of d in an interval: along each axis the intervals bound when the first
 //! segment can enter a slab and when the last one leaves it. A box that no t satisfies on all axes is met by none.
-//! Boxes are inflated by more than this rounds, see [`super::bvh`].
+//!
+//! The time at a coordinate x is x f - o f with f = 1/d, in one multiply-add. That rounds a place on the segment by less than 4
+//! roundings of the largest coordinate of the scene; boxes are inflated by more, see [`super::bvh`]. Factors are finite, and
+//! so are times: where d is nearly 0 it is taken to be as small as [`NIL`].
 
 use super::bvh::{Node, WIDTH};
 use super::planes::Directions;
@@ -13,15 +16,24 @@ const NIL: f32 = 1e-20;
 /// Entries are taken to be this much earlier than computed.
 const EARLIER: f32 = 1.0 - 1.0 / (1 << 21) as f32;
 
+/// Which way segments run along an axis, and so on which sides of a box they enter and leave.
+#[derive(Clone, Copy, Debug)]
+enum Way {
+    Up,
+    Down,
+    /// Some up and some down.
+    Both,
+}
+
 /// The segments from an apex to a box, made ready.
 pub(super) struct Shaft {
     apex: [f32; 3],
     pub(super) directions: Directions,
-    /// Factors of a box's low and high sides in the time of entry.
-    enter: [[f32; 3]; 2],
-    /// Factors and terms of its high and low sides in the time of leaving.
-    leave: [[f32; 3]; 2],
-    stay: [[f32; 3]; 2],
+    ways: [Way; 3],
+    /// By axis, factor and term of the first time at the low side of a box where segments enter there, or else the last.
+    low: [(f32, f32); 3],
+    /// The same of the high side.
+    high: [(f32, f32); 3],
 }
 
 impl Shaft {
@@ -36,18 +48,23 @@ impl Shaft {
     /// From `apex` along every d between `least` and `most`.
     #[inline(always)]
     pub(super) fn along(apex: [f32; 3], least: [f32; 3], most: [f32; 3]) -> Self {
-        let (mut enter, mut leave, mut stay) = ([[0.0; 3]; 2], [[0.0; 3]; 2], [[f32::INFINITY; 3]; 2]);
+        let directions = Directions::new(least, most);
+        let mut shaft = Shaft { apex, directions, ways: [Way::Both; 3], low: [(0.0, 0.0); 3], high: [(0.0, 0.0); 3] };
         for axis in 0..3 {
-            enter[0][axis] = 1.0 / most[axis].max(NIL);
-            enter[1][axis] = 1.0 / least[axis].min(-NIL);
-            if least[axis] > NIL {
-                (leave[0][axis], stay[0][axis]) = (1.0 / least[axis], 0.0);
+            let (mut least, mut most) = (least[axis], most[axis]);
+            if least > NIL {
+                shaft.ways[axis] = Way::Up;
+            } else if most < -NIL {
+                shaft.ways[axis] = Way::Down;
+            } else {
+                (least, most) = (least.min(-NIL), most.max(NIL));
             }
-            if most[axis] < -NIL {
-                (leave[1][axis], stay[1][axis]) = (1.0 / most[axis], 0.0);
-            }
+            // Up: the fastest enters first and the slowest leaves last. Down: the other way round, with the same factors.
+            let (low, high) = (1.0 / most, 1.0 / least);
+            shaft.low[axis] = (low, -apex[axis] * low);
+            shaft.high[axis] = (high, -apex[axis] * high);
         }
-        Shaft { apex, directions: Directions::new(least, most), enter, leave, stay }
+        shaft
     }
 
     /// The children of `node` whose boxes some segment may meet.
@@ -61,14 +78,13 @@ impl Shaft {
     pub(super) fn meets_before<I: Isa>(&self, node: &Node, end: f32) -> (u32, I::Eight) {
         let (mut enter, mut leave) = (I::Eight::splat(0.0), I::Eight::splat(end));
         for axis in 0..3 {
-            let apex = I::Eight::splat(self.apex[axis]);
-            let low = I::Eight::load(&node.low[axis]).sub(apex);
-            let high = I::Eight::load(&node.high[axis]).sub(apex);
-            let [enter_low, enter_high] = lanes::<I>(&self.enter, axis);
-            let [leave_high, leave_low] = lanes::<I>(&self.leave, axis);
-            let [stay_high, stay_low] = lanes::<I>(&self.stay, axis);
-            enter = enter.max(low.mul(enter_low).max(high.mul(enter_high)));
-            leave = leave.min(high.mul_add(leave_high, stay_high).min(low.mul_add(leave_low, stay_low)));
+            let low = times::<I>(&node.low[axis], self.low[axis]);
+            let high = times::<I>(&node.high[axis], self.high[axis]);
+            match self.ways[axis] {
+                Way::Up => (enter, leave) = (enter.max(low), leave.min(high)),
+                Way::Down => (enter, leave) = (enter.max(high), leave.min(low)),
+                Way::Both => enter = enter.max(low).max(high),
+            }
         }
         let miss = leave.less(enter.mul(I::Eight::splat(EARLIER)));
         (!miss & node.boxes, enter)
@@ -76,42 +92,50 @@ impl Shaft {
 }
 
 #[inline(always)]
-fn lanes<I: Isa>(sides: &[[f32; 3]; 2], axis: usize) -> [I::Eight; 2] {
-    [I::Eight::splat(sides[0][axis]), I::Eight::splat(sides[1][axis])]
+fn times<I: Isa>(sides: &[f32; WIDTH], (factor, term): (f32, f32)) -> I::Eight {
+    I::Eight::load(sides).mul_add(I::Eight::splat(factor), I::Eight::splat(term))
 }
 
 /// Sixteen segments from an apex, against one box at a time.
 pub(super) struct Bundle<I: Isa> {
-    inverse: [I::Sixteen; 3],
+    ways: [Way; 3],
+    factor: [I::Sixteen; 3],
+    term: [I::Sixteen; 3],
 }
 
 impl<I: Isa> Bundle<I> {
-    /// The segments along `d`.
+    /// The segments along `d`, all in `shaft`.
     #[inline(always)]
-    pub(super) fn new(d: &[I::Sixteen; 3]) -> Self {
-        let one = I::Sixteen::splat(1.0);
-        Bundle { inverse: [one.div(d[0]), one.div(d[1]), one.div(d[2])] }
+    pub(super) fn new(shaft: &Shaft, d: &[I::Sixteen; 3]) -> Self {
+        let mut bundle = Bundle::<I> { ways: shaft.ways, factor: *d, term: *d };
+        for axis in 0..3 {
+            let d = d[axis].abs().max(I::Sixteen::splat(NIL)).flip(d[axis]);
+            let factor = I::Sixteen::splat(1.0).div(d);
+            (bundle.factor[axis], bundle.term[axis]) = (factor, factor.mul(I::Sixteen::splat(-shaft.apex[axis])));
+        }
+        bundle
     }
 
     /// The segments that may meet box `slot` of `node`.
-    ///
-    /// A segment along one side of a box has an undefined time of entry; either answer is right, for the side is farther
-    /// from what is in the box than rounding is.
     #[inline(always)]
-    pub(super) fn meets(&self, node: &Node, slot: usize, apex: [f32; 3]) -> u32 {
-        self.meets_before(node, slot, apex, I::Sixteen::splat(1.0))
+    pub(super) fn meets(&self, node: &Node, slot: usize) -> u32 {
+        self.meets_before(node, slot, I::Sixteen::splat(1.0))
     }
 
     /// The same for rays that end at `ends`.
     #[inline(always)]
-    pub(super) fn meets_before(&self, node: &Node, slot: usize, apex: [f32; 3], ends: I::Sixteen) -> u32 {
+    pub(super) fn meets_before(&self, node: &Node, slot: usize, ends: I::Sixteen) -> u32 {
         debug_assert!(slot < WIDTH);
         let (mut enter, mut leave) = (I::Sixteen::splat(0.0), ends);
         for axis in 0..3 {
-            let low = self.inverse[axis].mul(I::Sixteen::splat(node.low[axis][slot] - apex[axis]));
-            let high = self.inverse[axis].mul(I::Sixteen::splat(node.high[axis][slot] - apex[axis]));
-            enter = low.min(high).max(enter);
-            leave = low.max(high).min(leave);
+            let (factor, term) = (self.factor[axis], self.term[axis]);
+            let low = I::Sixteen::splat(node.low[axis][slot]).mul_add(factor, term);
+            let high = I::Sixteen::splat(node.high[axis][slot]).mul_add(factor, term);
+            match self.ways[axis] {
+                Way::Up => (enter, leave) = (enter.max(low), leave.min(high)),
+                Way::Down => (enter, leave) = (enter.max(high), leave.min(low)),
+                Way::Both => (enter, leave) = (enter.max(low.min(high)), leave.min(low.max(high))),
+            }
         }
         !leave.less(enter.mul(I::Sixteen::splat(EARLIER)))
     }

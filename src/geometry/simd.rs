@@ -15,6 +15,7 @@ mod wide;
 
 use crate::error::{Error, Result};
 use plain::Plain;
+use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
 use std::sync::OnceLock;
 use wide::{Pair, Ymm, Zmm};
 
@@ -123,6 +124,15 @@ fn run_avx512<K: Kernel>(kernel: K) -> K::Output {
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
 fn run_avx2<K: Kernel>(kernel: K) -> K::Output {
     kernel.run::<Avx2>()
+}
+
+/// Asks for all of `what` before it is needed.
+#[inline(always)]
+pub(super) fn prefetch<T>(what: &T) {
+    for line in 0..size_of::<T>().div_ceil(64) {
+        // SAFETY: a prefetch reads nothing; SSE is part of every x86-64 processor.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>((what as *const T).cast::<i8>().wrapping_add(64 * line)) }
+    }
 }
 
 /// A computation that is compiled for every [`Isa`].

@@ -6,7 +6,7 @@
 //!
 //! ```text
 //! tile -> shaft against nodes -> candidates -> group -> shaft -> candidates -> bundle -> shaft, then 16 segments against
-//! boxes -> 8 triangles as planes through the apex: all segments miss, all are blocked, or each is asked
+//! boxes -> 8 triangles as planes through the apex, against each segment that is left, or each triangle against all
 //! ```
 //!
 //! Every step before a triangle is conservative and the planes leave to f64 what they cannot tell ([`super::planes`]), so the
@@ -16,16 +16,17 @@
 //! tile lies is known beforehand. Another kind of surface fits in like these, or as triangles whose bits are
 //! taken out of `hit` and given to f64 code of their own.
 
+mod bundle;
+
 use super::bvh::Node;
 use super::mesh::{Mesh, bits};
 use super::planes::{Directions, Extent, Planes, Rows};
 use super::points::Corners;
-use super::shaft::{Bundle, Shaft};
+use super::shaft::Shaft;
 use super::simd::Isa;
 use super::{Geometry, Sphere};
 use crate::math::Vec3;
 use arrayvec::ArrayVec;
-use smallvec::SmallVec;
 
 pub use super::points::Points;
 
@@ -95,12 +96,10 @@ impl Mesh {
         if alone {
             self.shadow_one_by_one(apex, points, &points.far, seen);
         }
-        let mut descent = Descent { mesh: self, points, apex: apex.to_array(), scratch };
-        if !alone {
-            return descent.tile::<I>(seen);
-        }
         let mut near = *seen;
         near.iter_mut().zip(&points.far).for_each(|(near, far)| *near &= !far);
+        // In one place: it is long, and compiled whole.
+        let mut descent = Descent { mesh: self, points, apex: apex.to_array(), scratch };
         descent.tile::<I>(&mut near);
         for ((seen, near), far) in seen.iter_mut().zip(near).zip(points.far) {
             *seen = near | *seen & far;
@@ -268,69 +267,6 @@ impl Descent<'_> {
                 }
             }
         }
-    }
-
-    /// The points of `seen` in a bundle that none of the candidates blocks.
-    #[inline(always)]
-    fn bundle<I: Isa>(&mut self, from: &[(u32, u32)], bundle: usize, seen: u16) -> u16 {
-        let corners = self.points.bundles[bundle];
-        let shaft = Shaft::new(self.apex, corners.0, corners.1);
-        let d = self.points.segments::<I>(bundle, self.apex);
-        let segments = Bundle::<I>::new(&d);
-        let mut seen = seen;
-        let mut open: SmallVec<[(u32, u32); 256]> = SmallVec::new();
-        open.extend_from_slice(from);
-        while let Some((number, boxes)) = open.pop() {
-            let node = &self.mesh.bvh.nodes[number as usize];
-            let met = shaft.meets::<I>(node) & boxes;
-            for slot in bits(met & node.blocks) {
-                if segments.meets(node, slot, self.apex) & u32::from(seen) == 0 {
-                    continue;
-                }
-                seen = self.block::<I>(node, slot, bundle, &shaft, &d, seen);
-                if seen == 0 {
-                    return 0;
-                }
-            }
-            for slot in bits(met & !node.blocks) {
-                if segments.meets(node, slot, self.apex) & u32::from(seen) != 0 {
-                    open.push((node.child[slot], u32::MAX));
-                }
-            }
-        }
-        seen
-    }
-
-    /// The points of `seen` that no triangle of a block blocks.
-    #[inline(always)]
-    fn block<I: Isa>(
-        &mut self,
-        node: &Node,
-        slot: usize,
-        bundle: usize,
-        shaft: &Shaft,
-        d: &[I::Sixteen; 3],
-        seen: u16,
-    ) -> u16 {
-        let planes = self.planes::<I>(node, slot, shaft);
-        let against = planes.against(&shaft.directions);
-        let there = (1u32 << node.triangles[slot]) - 1;
-        if against.cover & there != 0 {
-            return 0;
-        }
-        let may = against.may & there;
-        if may == 0 {
-            return seen;
-        }
-        planes.store(&mut self.scratch.few[0]);
-        let mut seen = seen;
-        for lane in bits(may) {
-            seen = self.test_triangle::<I>(&self.scratch.few[0], node.child[slot], lane, bundle, d, seen);
-            if seen == 0 {
-                break;
-            }
-        }
-        seen
     }
 
     #[inline(always)]

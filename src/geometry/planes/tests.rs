@@ -91,8 +91,9 @@ impl Kernel for Judge {
         planes.store(&mut rows);
         let ray = [I::Sixteen::splat(d.x), I::Sixteen::splat(d.y), I::Sixteen::splat(d.z)];
         let single = rows.test::<I>(0, &ray);
-        let against = planes.against(&directions);
-        let (hit, miss) = (single.hit | against.cover & 1, single.miss | !against.may & 1);
+        let (against, alone) = (planes.against(&directions), planes.test(d.to_array()));
+        let hit = single.hit | alone.hit | against.cover;
+        let miss = single.miss | alone.miss | !against.may | !planes.toward(&directions);
         let crosses = Triangle::new(corners).crosses(apex.as_dvec3(), d.as_dvec3());
         let contradicted = if crosses { miss & 1 == 1 } else { hit & 1 == 1 };
         (errors::<I>(&self.0, &rows, &ray), contradicted)
