@@ -21,12 +21,25 @@ pub struct Mesh {
     place: Vec<u32>,
     pub(super) bvh: Bvh8,
     pub(super) blocks: Vec<Block>,
+    /// What rays want to know of each block beforehand.
+    pub(super) leaves: Vec<Leaf>,
     bounds: (DVec3, DVec3),
     /// The bounds and a little around them, where rays may start.
     near: (DVec3, DVec3),
     /// More than f64 rounds of a distance from a plane \[m\].
     pub(super) floor: f32,
     pub(super) path: Path,
+}
+
+/// A block, for single rays.
+#[derive(Clone, Copy)]
+pub(super) struct Leaf {
+    /// Where its triangles begin.
+    pub(super) first: u32,
+    /// Bit i: lane i has a triangle.
+    pub(super) lanes: u32,
+    /// The longest side of the box around it \[m\].
+    pub(super) edge: f32,
 }
 
 /// A triangle as rays meet it.
@@ -64,11 +77,12 @@ impl Mesh {
             Block::new(&corners)
         };
         let blocks = (0..bvh.firsts.len() as u32 - 1).map(block).collect();
+        let leaves = leaves(&bvh);
         let around = 0.01 * (bounds.1 - bounds.0).max_element();
         let near = (bounds.0 - around, bounds.1 + around);
         let floor = (size / (1u64 << 46) as f64) as f32;
         let path = Path::chosen().unwrap_or(Path::Scalar);
-        Mesh { triangles: ordered, place, bvh, blocks, bounds, near, floor, path }
+        Mesh { triangles: ordered, place, bvh, blocks, leaves, bounds, near, floor, path }
     }
 
     /// Number of triangles.
@@ -83,7 +97,7 @@ impl Mesh {
 
     /// Memory \[bytes\].
     pub fn bytes(&self) -> u64 {
-        let blocks = size_of_val(&self.blocks[..]);
+        let blocks = size_of_val(&self.blocks[..]) + size_of_val(&self.leaves[..]);
         (size_of_val(&self.triangles[..]) + size_of_val(&self.place[..]) + blocks + self.bvh.bytes()) as u64
     }
 
@@ -119,17 +133,17 @@ impl Mesh {
         p.cmpge(self.near.0).all() && p.cmple(self.near.1).all()
     }
 
+    #[inline]
     pub(super) fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-        if self.is_near(ray.origin) {
-            return self.closest_hit_near(ray);
-        }
-        let (enter, _) = self.clip(ray.origin, ray.direction, f64::INFINITY)?;
-        let hit = self.closest_hit_near(&Ray { origin: ray.origin + enter * ray.direction, ..*ray })?;
-        Some(Hit { distance: hit.distance + enter, ..hit })
+        if self.is_near(ray.origin) { self.path.run(Closest { mesh: self, ray }) } else { self.closest_hit_from_far(ray) }
     }
 
-    fn closest_hit_near(&self, ray: &Ray) -> Option<Hit> {
-        self.path.run(Closest { mesh: self, ray })
+    #[cold]
+    fn closest_hit_from_far(&self, ray: &Ray) -> Option<Hit> {
+        let (enter, _) = self.clip(ray.origin, ray.direction, f64::INFINITY)?;
+        let near = Ray { origin: ray.origin + enter * ray.direction, ..*ray };
+        let hit = self.path.run(Closest { mesh: self, ray: &near })?;
+        Some(Hit { distance: hit.distance + enter, ..hit })
     }
 
     /// True when a triangle crosses the segment from `a` to `b`, ends excluded.
@@ -144,6 +158,20 @@ impl Mesh {
             self.path.run(Any { mesh: self, origin: a, direction: b - a })
         })
     }
+}
+
+fn leaves(bvh: &Bvh8) -> Vec<Leaf> {
+    let mut leaves = vec![Leaf { first: 0, lanes: 0, edge: 0.0 }; bvh.firsts.len() - 1];
+    for node in &bvh.nodes {
+        for slot in bits(node.blocks) {
+            let number = node.child[slot];
+            let edge = (0..3).map(|axis| node.high[axis][slot] - node.low[axis][slot]).fold(0.0, f32::max);
+            let range = bvh.block(number);
+            let lanes = (1u32 << range.len()) - 1;
+            leaves[number as usize] = Leaf { first: range.start as u32, lanes, edge };
+        }
+    }
+    leaves
 }
 
 /// The numbers of the bits that are set.
@@ -263,16 +291,17 @@ impl Triangle {
     /// Parameter 0 < t <= limit at which the line o + t d crosses the triangle, edges included.
     #[inline(always)]
     pub(super) fn intersect(&self, o: DVec3, d: DVec3, limit: f64) -> Option<f64> {
-        let [a, b, c] = self.corners.map(|p| p.as_dvec3());
         let t = self.face(o).distance(d);
         // Edge-on the quotient is infinite or undefined: a triangle seen edge-on is not there.
-        if !(t > 0.0 && t <= limit && t.is_finite()) {
-            return None;
-        }
-        let (a, b, c) = (a - o, b - o, c - o);
+        (t > 0.0 && t <= limit && t.is_finite() && self.is_crossed(o, d)).then_some(t)
+    }
+
+    /// True when the line o + t d crosses the triangle, edges included.
+    #[inline(always)]
+    pub(super) fn is_crossed(&self, o: DVec3, d: DVec3) -> bool {
+        let [a, b, c] = self.corners.map(|p| p.as_dvec3() - o);
         let edges = [d.dot(c.cross(b)), d.dot(a.cross(c)), d.dot(b.cross(a))];
-        let one_side = edges.iter().all(|&e| e >= 0.0) || edges.iter().all(|&e| e <= 0.0);
-        one_side.then_some(t)
+        edges.iter().all(|&e| e >= 0.0) || edges.iter().all(|&e| e <= 0.0)
     }
 
     /// True when the segment from `o` along `d` crosses the triangle, edges included and ends excluded.
