@@ -135,14 +135,14 @@ impl Mesh {
 
     #[inline]
     pub(super) fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-        if self.is_near(ray.origin) { self.path.run(Closest { mesh: self, ray }) } else { self.closest_hit_from_far(ray) }
+        if self.is_near(ray.origin) { self.path.for_eights().run(Closest { mesh: self, ray }) } else { self.closest_hit_from_far(ray) }
     }
 
     #[cold]
     fn closest_hit_from_far(&self, ray: &Ray) -> Option<Hit> {
         let (enter, _) = self.clip(ray.origin, ray.direction, f64::INFINITY)?;
         let near = Ray { origin: ray.origin + enter * ray.direction, ..*ray };
-        let hit = self.path.run(Closest { mesh: self, ray: &near })?;
+        let hit = self.path.for_eights().run(Closest { mesh: self, ray: &near })?;
         Some(Hit { distance: hit.distance + enter, ..hit })
     }
 
@@ -150,12 +150,12 @@ impl Mesh {
     pub(super) fn blocks(&self, a: Vec3, b: Vec3) -> bool {
         let (o, end) = (a.as_dvec3(), b.as_dvec3());
         if self.is_near(o) && self.is_near(end) {
-            return self.path.run(Any { mesh: self, origin: a, direction: b - a });
+            return self.path.for_eights().run(Any { mesh: self, origin: a, direction: b - a });
         }
         let clipped = self.clip(o, end - o, 1.0);
         clipped.is_some_and(|(enter, leave)| {
             let (a, b) = ((o + enter * (end - o)).as_vec3(), (o + leave * (end - o)).as_vec3());
-            self.path.run(Any { mesh: self, origin: a, direction: b - a })
+            self.path.for_eights().run(Any { mesh: self, origin: a, direction: b - a })
         })
     }
 }

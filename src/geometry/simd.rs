@@ -90,6 +90,11 @@ impl Path {
         })
     }
 
+    /// The path for kernels without vectors of sixteen, which gain nothing from AVX-512.
+    pub fn for_eights(self) -> Path {
+        if self == Path::Avx512 { Path::Avx2 } else { self }
+    }
+
     /// Runs `kernel` compiled for these instructions.
     ///
     /// # Panics
@@ -106,7 +111,7 @@ impl Path {
                 assert!(self.is_available(), "no AVX2 here");
                 unsafe { run_avx2(kernel) }
             }
-            Path::Scalar => kernel.run::<Scalar>(),
+            Path::Scalar => run_scalar(kernel),
         }
     }
 }
@@ -119,6 +124,12 @@ fn run_avx512<K: Kernel>(kernel: K) -> K::Output {
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
 fn run_avx2<K: Kernel>(kernel: K) -> K::Output {
     kernel.run::<Avx2>()
+}
+
+/// Not inlined, as the others cannot be: what calls a kernel stays small.
+#[inline(never)]
+fn run_scalar<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run::<Scalar>()
 }
 
 /// A computation that is compiled for every [`Isa`].
