@@ -5,10 +5,10 @@
 //! edge changes exactly their sign, so the two neighbours of an edge agree about the side on which a ray passes; a ray on the
 //! edge meets both. Everything before that, in f32 and for many triangles at once, is conservative.
 
-use super::bvh::{Bvh8, WIDTH};
+use super::bvh::{Bvh8, Node, WIDTH};
 use super::planes::Block;
 use super::ray::{Any, Closest};
-use super::simd::Path;
+use super::simd::{Path, prefetch};
 use super::{Hit, Ray, hit};
 use crate::math::{DVec3, Vec3};
 use arrayvec::ArrayVec;
@@ -135,7 +135,11 @@ impl Mesh {
 
     #[inline]
     pub(super) fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-        if self.is_near(ray.origin) { self.path.for_eights().run(Closest { mesh: self, ray }) } else { self.closest_hit_from_far(ray) }
+        if self.is_near(ray.origin) {
+            self.path.for_eights().run(Closest { mesh: self, ray })
+        } else {
+            self.closest_hit_from_far(ray)
+        }
     }
 
     #[cold]
@@ -144,6 +148,19 @@ impl Mesh {
         let near = Ray { origin: ray.origin + enter * ray.direction, ..*ray };
         let hit = self.path.for_eights().run(Closest { mesh: self, ray: &near })?;
         Some(Hit { distance: hit.distance + enter, ..hit })
+    }
+
+    /// Asks for the memory of what is in the boxes `met` of `node`.
+    #[inline(always)]
+    pub(super) fn prefetch(&self, node: &Node, met: u32) {
+        for slot in bits(met) {
+            let child = node.child[slot] as usize;
+            if node.blocks >> slot & 1 == 1 {
+                prefetch(&self.blocks[child]);
+            } else {
+                prefetch(&self.bvh.nodes[child]);
+            }
+        }
     }
 
     /// True when a triangle crosses the segment from `a` to `b`, ends excluded.

@@ -162,6 +162,7 @@ impl<'a, I: Isa> Search<'a, I> {
                 let (met, enter) = self.shaft.meets_before::<I>(node, self.end);
                 let mut times = [0.0; WIDTH];
                 enter.store(&mut times);
+                self.mesh.prefetch(node, met);
                 self.work.open.push(number, met, &times);
             }
             let Some((_, number, slot)) = self.work.open.pop(self.end) else { return self.finish(rays, hits) };

@@ -1,25 +1,24 @@
 //! Single rays through the mesh: the closest triangle, and whether any is met.
 //!
-//! A ray asks eight boxes at once, and goes into the nearest first; then eight triangles at once. With (x, y) the corners across
-//! the ray, in the frame of two unit vectors at right angles to it, the areas of the triangles between the ray and each edge,
+//! A ray asks eight boxes at once, and goes into the nearest first; then eight triangles at once, sheared so that it runs along
+//! an axis z, the one nearest to its direction. With (x, y) the corners seen from there, the areas of the triangles between the
+//! ray and each edge,
 //!
 //! ```text
 //! U = c_x b_y - c_y b_x,   V = a_x c_y - a_y c_x,   W = b_x a_y - b_y a_x
 //! ```
 //!
-//! have one sign where the line crosses the triangle; N . a / N . d is where. Both are in f32 with certain bounds, so that f64
-//! computes the distance of what is nearest, mostly one triangle, and is asked whether it is crossed at all only where the ray
-//! passes an edge too closely.
+//! have one sign where the line crosses the triangle. They are in f32 with a tolerance: where all three are certain, f64 only
+//! computes the distance; where they are not, it decides too.
 //!
-//! With u = 2^-24, M an upper bound of how far the corners are, L the longest side of the box around them, and the ray within L/2
-//! of this box (boxes are inflated more than their test rounds), |x| and |y| are at most 2.3 L. Their errors are at most 14 u M: 1
-//! of the corner, 6 of the scalar product, 6 because the frame is rounded and the ray not quite at right angles to it, 1 to spare.
-//! Those of the areas are 4 x 2.3 L times that, and 4 u (2.3 L)^2 for their own rounding: 130 u M L + 24 u L^2. The errors of N . a and
-//! N . d are those in [`super::planes`].
+//! With u = 2^-24, M an upper bound of how far the corners are along any axis, L the longest side of the box around them, and the
+//! ray within L/2 of this box (boxes are inflated more than their test rounds), |x| and |y| are at most 3 L. Their errors are 5 u M +
+//! 3 u L: 1 of x, 1 of z, 2 of the shear, 1 of the product where it is not fused, and that of the result. Those of the areas are
+//! 4 x 3 L times that, and 4 u (3 L)^2 for their own rounding: 60 u M L + 72 u L^2. What f64 rounds is far less.
 
 use super::bvh::{Node, WIDTH};
 use super::mesh::{Face, Leaf, Mesh, Open, Triangle, bits};
-use super::planes::{Block, U, dot, load, splat, sub};
+use super::planes::{Block, U, splat};
 use super::simd::{Isa, Kernel, Vector};
 use super::{Hit, Ray};
 use crate::math::{DVec3, Vec3};
@@ -28,8 +27,8 @@ use smallvec::SmallVec;
 /// Stands for 0 where one divides by a coordinate of a direction: far below what boxes are inflated by.
 const NIL: f32 = 1e-20;
 
-/// Tolerance of the areas in units of u M L.
-const ACROSS: f32 = 130.0;
+/// The axes with the one that a ray runs along last.
+const ORDERS: [[usize; 3]; 3] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]];
 
 /// A ray in f32 on its way through the boxes.
 struct BoxRay<I: Isa> {
@@ -72,11 +71,12 @@ struct Crossed {
     sure: u32,
 }
 
-/// A ray in f32 on its way through the triangles.
+/// A ray in f32 on its way through the triangles, its coordinates in the order x, y, z of the sheared space.
 struct Sight<I: Isa> {
+    axes: [usize; 3],
     origin: [I::Eight; 3],
-    /// Two unit vectors across the direction.
-    across: [[I::Eight; 3]; 2],
+    /// What x and y lose per z.
+    shear: [I::Eight; 2],
     /// |d|, a little more.
     length: f32,
 }
@@ -85,15 +85,16 @@ impl<I: Isa> Sight<I> {
     /// Along a direction that is `length` long.
     #[inline(always)]
     fn new(origin: Vec3, direction: Vec3, length: f32) -> Self {
-        let Vec3 { x, y, z } = direction / length;
-        // The frame of Duff et al. 2017.
-        let sign = 1f32.copysign(z);
-        let a = -1.0 / (sign + z);
-        let b = x * y * a;
-        let across = [[1.0 + sign * x * x * a, sign * b, -sign * x], [b, sign + y * y * a, -y]];
+        let size = direction.abs();
+        let steep = usize::from(size.z > size.x && size.z > size.y);
+        let axes = ORDERS[2 * steep + (1 - steep) * usize::from(size.y > size.x)];
+        // In memory an index is no branch; which axis it is nobody can predict.
+        let (o, d) = (std::hint::black_box(origin.to_array()), std::hint::black_box(direction.to_array()));
+        let slope = -1.0 / d[axes[2]];
         Sight {
-            origin: splat::<I>(origin.to_array()),
-            across: [splat::<I>(across[0]), splat::<I>(across[1])],
+            axes,
+            origin: splat::<I>([o[axes[0]], o[axes[1]], o[axes[2]]]),
+            shear: [I::Eight::splat(d[axes[0]] * slope), I::Eight::splat(d[axes[1]] * slope)],
             length: length * (1.0 + 8.0 * U),
         }
     }
@@ -105,7 +106,7 @@ impl<I: Isa> Sight<I> {
         let [u, v, w] = [area::<I>(&c, &b), area::<I>(&a, &c), area::<I>(&b, &a)];
         let (least, most) = (u.min(v).min(w), u.max(v).max(w));
         let far = time * self.length + 2.0 * leaf.edge;
-        let tolerance = (ACROSS * far + 24.0 * leaf.edge) * leaf.edge * U;
+        let tolerance = (60.0 * far + 72.0 * leaf.edge) * leaf.edge * U;
         let (above, below) = (I::Eight::splat(tolerance), I::Eight::splat(-tolerance));
         let outside = least.less(below) & above.less(most);
         let inside = above.less(least) | most.less(below);
@@ -114,8 +115,10 @@ impl<I: Isa> Sight<I> {
 
     #[inline(always)]
     fn seen(&self, block: &Block, corner: usize) -> Corner<I> {
-        let from = sub::<I>(load::<I>(&block.corners[corner]), self.origin);
-        Corner { x: dot::<I>(from, self.across[0]), y: dot::<I>(from, self.across[1]) }
+        let rows = &block.corners[corner];
+        let from = |k: usize| I::Eight::load(&rows[self.axes[k]]).sub(self.origin[k]);
+        let z = from(2);
+        Corner { x: z.mul_add(self.shear[0], from(0)), y: z.mul_add(self.shear[1], from(1)) }
     }
 }
 
@@ -146,12 +149,14 @@ impl Kernel for Closest<'_> {
         let (origin, direction) = (ray.origin.as_vec3(), ray.direction.as_vec3());
         let (o, d) = (origin.as_dvec3(), direction.as_dvec3());
         let (boxes, sight) = (BoxRay::<I>::new(origin, direction), Sight::<I>::new(origin, direction, 1.0));
-        let mut best = Best { distance: f64::INFINITY, end: f32::INFINITY, found: None };
+        let mut best = Best { distance: f64::MAX, end: f32::INFINITY, found: None };
         let mut open = Open::default();
         let mut next = if mesh.is_empty() { None } else { Some(0) };
         loop {
             if let Some(number) = next.take() {
-                let (met, times) = boxes.meets(&mesh.bvh.nodes[number as usize], best.end);
+                let node = &mesh.bvh.nodes[number as usize];
+                let (met, times) = boxes.meets(node, best.end);
+                mesh.prefetch(node, met);
                 open.push(number, met, &times);
             }
             let Some((time, number, slot)) = open.pop(best.end) else { break };
@@ -164,7 +169,8 @@ impl Kernel for Closest<'_> {
             let (block, leaf) = (&mesh.blocks[child as usize], mesh.leaves[child as usize]);
             let crossed = sight.crosses(block, leaf, time);
             for lane in bits(crossed.may) {
-                let triangle = Triangle { corners: block.triangle(lane), primitive: mesh.bvh.order[leaf.first as usize + lane] };
+                let triangle =
+                    Triangle { corners: block.triangle(lane), primitive: mesh.bvh.order[leaf.first as usize + lane] };
                 best.offer(triangle, crossed.sure >> lane & 1 == 1, o, d);
             }
         }
@@ -188,7 +194,7 @@ impl Best {
         let face = triangle.face(o);
         let t = face.distance(d);
         // Edge-on the quotient is infinite or undefined.
-        if !(t > 0.0 && t <= self.distance && t < f64::INFINITY) || !(inside || triangle.is_crossed(o, d)) {
+        if !(t > 0.0 && t <= self.distance) || !(inside || triangle.is_crossed(o, d)) {
             return;
         }
         if t < self.distance || self.found.as_ref().is_none_or(|&(primitive, _)| triangle.primitive < primitive) {
@@ -213,6 +219,8 @@ impl Kernel for Any<'_> {
         let Any { mesh, origin, direction } = self;
         let (o, d) = (origin.as_dvec3(), direction.as_dvec3());
         let length = direction.dot(direction).sqrt();
+        // Of points that are all but one nothing is certain, and NaN says so.
+        let length = if length > 1e-15 { length } else { f32::NAN };
         let (ray, sight) = (BoxRay::<I>::new(origin, direction), Sight::<I>::new(origin, direction, length));
         let mut open: SmallVec<[u32; 96]> = SmallVec::new();
         if !mesh.is_empty() {

@@ -126,6 +126,15 @@ fn run_avx2<K: Kernel>(kernel: K) -> K::Output {
     kernel.run::<Avx2>()
 }
 
+/// Asks for the memory of `what`, which is wanted soon.
+#[inline(always)]
+pub(super) fn prefetch<T>(what: &T) {
+    for line in (0..size_of::<T>()).step_by(64) {
+        // SAFETY: nothing is read, and every processor of this kind has the instruction.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(what).cast::<i8>().add(line)) }
+    }
+}
+
 /// Not inlined, as the others cannot be: what calls a kernel stays small.
 #[inline(never)]
 fn run_scalar<K: Kernel>(kernel: K) -> K::Output {
