@@ -23,6 +23,7 @@ use super::simd::{Isa, Kernel, Vector};
 use super::{Hit, Ray};
 use crate::math::{DVec3, Vec3};
 use smallvec::SmallVec;
+use std::hint::black_box;
 
 /// Stands for 0 where one divides by a coordinate of a direction: far below what boxes are inflated by.
 const NIL: f32 = 1e-20;
@@ -89,7 +90,7 @@ impl<I: Isa> Sight<I> {
         let steep = usize::from(size.z > size.x && size.z > size.y);
         let axes = ORDERS[2 * steep + (1 - steep) * usize::from(size.y > size.x)];
         // In memory an index is no branch; which axis it is nobody can predict.
-        let (o, d) = (std::hint::black_box(origin.to_array()), std::hint::black_box(direction.to_array()));
+        let (o, d) = (black_box(origin.to_array()), black_box(direction.to_array()));
         let slope = -1.0 / d[axes[2]];
         Sight {
             axes,
@@ -133,6 +134,14 @@ fn area<I: Isa>(p: &Corner<I>, q: &Corner<I>) -> I::Eight {
     p.x.mul_sub(q.y, p.y.mul(q.x))
 }
 
+/// The same ray, its coordinates read one by one: the processor waits for the caller to have written them where it wrote them in
+/// pairs and they are read in others.
+#[inline(always)]
+fn one_by_one(ray: &Ray) -> Ray {
+    let read = |v: &DVec3| DVec3::new(black_box(v.x), black_box(v.y), black_box(v.z));
+    Ray { origin: read(&ray.origin), direction: read(&ray.direction) }
+}
+
 /// The first triangle along a ray that starts near the mesh.
 pub(super) struct Closest<'a> {
     pub(super) mesh: &'a Mesh,
@@ -145,6 +154,7 @@ impl Kernel for Closest<'_> {
     #[inline(always)]
     fn run<I: Isa>(self) -> Option<Hit> {
         let Closest { mesh, ray } = self;
+        let ray = one_by_one(ray);
         // Boxes and triangles must see the same ray, or it could pass between a box and its triangle.
         let (origin, direction) = (ray.origin.as_vec3(), ray.direction.as_vec3());
         let (o, d) = (origin.as_dvec3(), direction.as_dvec3());
@@ -175,7 +185,7 @@ impl Kernel for Closest<'_> {
             }
         }
         let (primitive, face) = best.found?;
-        Some(face.hit(ray, best.distance, primitive, face.unit()))
+        Some(face.hit(&ray, best.distance, primitive, face.unit()))
     }
 }
 
