@@ -13,6 +13,9 @@ use super::{Hit, Ray, hit};
 use crate::math::{DVec3, Vec3};
 use arrayvec::ArrayVec;
 
+/// Blocks that stay in the caches near a core.
+const CACHED: usize = 256;
+
 /// Triangles and their hierarchy.
 pub struct Mesh {
     /// In the order of the blocks.
@@ -153,6 +156,9 @@ impl Mesh {
     /// Asks for the memory of what is in the boxes `met` of `node`.
     #[inline(always)]
     pub(super) fn prefetch(&self, node: &Node, met: u32) {
+        if self.blocks.len() < CACHED {
+            return;
+        }
         for slot in bits(met) {
             let child = node.child[slot] as usize;
             if node.blocks >> slot & 1 == 1 {
