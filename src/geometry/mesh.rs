@@ -1,4 +1,4 @@
-//! Triangles in f32 under a hierarchy of boxes, and single rays through them.
+//! Triangles in f32 under a hierarchy of boxes, and what all rays through them share.
 //!
 //! Whether a ray crosses a triangle is decided in f64: no ray slips between triangles that share bit-identical corners,
 //! because the three edge functions of a triangle are triple products in f64 of f32 corners, and swapping the ends of an
