@@ -101,6 +101,10 @@ fn segments_are_blocked_as_by_brute_force() {
         assert!(visible == expected || (o - DVec3::splat(0.5)).length() > 0.39, "{a} {b}: blocked by nothing");
     }
     assert!((1000..4900).contains(&blocked), "{blocked} of 5000 blocked");
+    for length in [0.0, 1e-30, 1e-12] {
+        let a = 0.01 * Vec3::ONE;
+        assert!(geometry.visible(a, a + Vec3::X * length), "nothing lies within {length} m of a point in the air");
+    }
 }
 
 /// A closed surface of many triangles: an octahedron's faces divided `depth` times, pushed out to a bumpy sphere.

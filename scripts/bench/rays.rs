@@ -77,7 +77,10 @@ fn bench(scene: Scene) {
 fn trace(way: Way, geometry: &Geometry, peer: &Peer, flights: &[Flight]) -> usize {
     let ray = |&(origin, direction): &Flight| Ray { origin: origin.as_dvec3(), direction: direction.as_dvec3() };
     match way {
-        Way::Single => flights.iter().filter(|f| std::hint::black_box(geometry.closest_hit(&ray(f))).is_some()).count(),
+        Way::Single => {
+            let meets = |flight: &&Flight| std::hint::black_box(&geometry.closest_hit(&ray(flight))).is_some();
+            flights.iter().filter(meets).count()
+        }
         Way::Packets => {
             let mut hits: Vec<Option<Hit>> = Vec::new();
             let mut met = 0;

@@ -1,15 +1,15 @@
-//! Triangles in f32 under a hierarchy of boxes, and single rays through them.
+//! Triangles in f32 under a hierarchy of boxes, and what all rays through them share.
 //!
 //! Whether a ray crosses a triangle is decided in f64: no ray slips between triangles that share bit-identical corners,
 //! because the three edge functions of a triangle are triple products in f64 of f32 corners, and swapping the ends of an
 //! edge changes exactly their sign, so the two neighbours of an edge agree about the side on which a ray passes; a ray on the
 //! edge meets both. Everything before that, in f32 and for many triangles at once, is conservative.
 
-use super::bvh::{Bvh8, WIDTH};
+use super::bvh::{Bvh8, Node, WIDTH};
 use super::pages;
 use super::planes::Block;
 use super::ray::{Any, Closest};
-use super::simd::Path;
+use super::simd::{Path, prefetch};
 use super::{Hit, Ray, hit};
 use crate::math::{DVec3, Vec3};
 use arrayvec::ArrayVec;
@@ -17,6 +17,9 @@ use arrayvec::ArrayVec;
 /// How far from a triangle's box f64 may see a crossing, in units of the largest coordinate of a corner seen from the start
 /// of the ray: far more than f64 rounds, a quarter of what the boxes of the hierarchy are inflated by.
 const AROUND: f64 = 4.0 / (1u64 << 24) as f64;
+
+/// Blocks that stay in the caches near a core.
+const CACHED: usize = 256;
 
 /// Triangles and their hierarchy.
 pub struct Mesh {
@@ -26,12 +29,25 @@ pub struct Mesh {
     place: Vec<u32>,
     pub(super) bvh: Bvh8,
     pub(super) blocks: Vec<Block>,
+    /// What rays want to know of each block beforehand.
+    pub(super) leaves: Vec<Leaf>,
     bounds: (DVec3, DVec3),
     /// The bounds and a little around them, where rays may start.
     near: (DVec3, DVec3),
     /// More than f64 rounds of a distance from a plane \[m\].
     pub(super) floor: f32,
     pub(super) path: Path,
+}
+
+/// A block, for single rays.
+#[derive(Clone, Copy)]
+pub(super) struct Leaf {
+    /// Where its triangles begin.
+    pub(super) first: u32,
+    /// Bit i: lane i has a triangle.
+    pub(super) lanes: u32,
+    /// The longest side of the box around it \[m\].
+    pub(super) edge: f32,
 }
 
 /// A triangle as rays meet it.
@@ -69,11 +85,12 @@ impl Mesh {
             Block::new(&corners)
         };
         let blocks = pages::collect(bvh.firsts.len() - 1, (0..bvh.firsts.len() as u32 - 1).map(block));
+        let leaves = leaves(&bvh);
         let around = 0.01 * (bounds.1 - bounds.0).max_element();
         let near = (bounds.0 - around, bounds.1 + around);
         let floor = (size / (1u64 << 46) as f64) as f32;
         let path = Path::chosen().unwrap_or(Path::Scalar);
-        Mesh { triangles: ordered, place, bvh, blocks, bounds, near, floor, path }
+        Mesh { triangles: ordered, place, bvh, blocks, leaves, bounds, near, floor, path }
     }
 
     /// Number of triangles.
@@ -88,7 +105,7 @@ impl Mesh {
 
     /// Memory \[bytes\].
     pub fn bytes(&self) -> u64 {
-        let blocks = size_of_val(&self.blocks[..]);
+        let blocks = size_of_val(&self.blocks[..]) + size_of_val(&self.leaves[..]);
         (size_of_val(&self.triangles[..]) + size_of_val(&self.place[..]) + blocks + self.bvh.bytes()) as u64
     }
 
@@ -124,31 +141,65 @@ impl Mesh {
         p.cmpge(self.near.0).all() && p.cmple(self.near.1).all()
     }
 
+    #[inline]
     pub(super) fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
         if self.is_near(ray.origin) {
-            return self.closest_hit_near(ray);
+            self.path.for_eights().run(Closest { mesh: self, ray })
+        } else {
+            self.closest_hit_from_far(ray)
         }
+    }
+
+    #[cold]
+    fn closest_hit_from_far(&self, ray: &Ray) -> Option<Hit> {
         let (enter, _) = self.clip(ray.origin, ray.direction, f64::INFINITY)?;
-        let hit = self.closest_hit_near(&Ray { origin: ray.origin + enter * ray.direction, ..*ray })?;
+        let near = Ray { origin: ray.origin + enter * ray.direction, ..*ray };
+        let hit = self.path.for_eights().run(Closest { mesh: self, ray: &near })?;
         Some(Hit { distance: hit.distance + enter, ..hit })
     }
 
-    fn closest_hit_near(&self, ray: &Ray) -> Option<Hit> {
-        self.path.run(Closest { mesh: self, ray })
+    /// Asks for the memory of what is in the boxes `met` of `node`.
+    #[inline(always)]
+    pub(super) fn prefetch(&self, node: &Node, met: u32) {
+        if self.blocks.len() < CACHED {
+            return;
+        }
+        for slot in bits(met) {
+            let child = node.child[slot] as usize;
+            if node.blocks >> slot & 1 == 1 {
+                prefetch(&self.blocks[child]);
+            } else {
+                prefetch(&self.bvh.nodes[child]);
+            }
+        }
     }
 
     /// True when a triangle crosses the segment from `a` to `b`, ends excluded.
     pub(super) fn blocks(&self, a: Vec3, b: Vec3) -> bool {
         let (o, end) = (a.as_dvec3(), b.as_dvec3());
         if self.is_near(o) && self.is_near(end) {
-            return self.path.run(Any { mesh: self, origin: a, direction: b - a });
+            return self.path.for_eights().run(Any { mesh: self, origin: a, direction: b - a });
         }
         let clipped = self.clip(o, end - o, 1.0);
         clipped.is_some_and(|(enter, leave)| {
             let (a, b) = ((o + enter * (end - o)).as_vec3(), (o + leave * (end - o)).as_vec3());
-            self.path.run(Any { mesh: self, origin: a, direction: b - a })
+            self.path.for_eights().run(Any { mesh: self, origin: a, direction: b - a })
         })
     }
+}
+
+fn leaves(bvh: &Bvh8) -> Vec<Leaf> {
+    let mut leaves = vec![Leaf { first: 0, lanes: 0, edge: 0.0 }; bvh.firsts.len() - 1];
+    for node in &bvh.nodes {
+        for slot in bits(node.blocks) {
+            let number = node.child[slot];
+            let edge = (0..3).map(|axis| node.high[axis][slot] - node.low[axis][slot]).fold(0.0, f32::max);
+            let range = bvh.block(number);
+            let lanes = (1u32 << range.len()) - 1;
+            leaves[number as usize] = Leaf { first: range.start as u32, lanes, edge };
+        }
+    }
+    leaves
 }
 
 /// The numbers of the bits that are set.
@@ -271,27 +322,29 @@ impl Triangle {
     }
 
     /// Parameter 0 < t <= limit at which the line o + t d crosses the triangle, edges included.
+    #[inline(always)]
+    pub(super) fn intersect(&self, o: DVec3, d: DVec3, limit: f64) -> Option<f64> {
+        let t = self.face(o).distance(d);
+        // Edge-on the quotient is infinite or undefined: a triangle seen edge-on is not there.
+        (t > 0.0 && t <= limit && t.is_finite() && self.is_crossed(o, d, t)).then_some(t)
+    }
+
+    /// True when the line along `d`, which meets the plane at parameter `t`, crosses the triangle, edges included.
     ///
     /// A line in the triangle's very plane has only roundings for t and for sides, and could seem to cross anywhere. So the
     /// crossing must lie in the box around the triangle, give or take [`AROUND`]: then no test of a box, which is
     /// inflated by more, can contradict, and the answer is the same by whatever way through the hierarchy.
     #[inline(always)]
-    pub(super) fn intersect(&self, o: DVec3, d: DVec3, limit: f64) -> Option<f64> {
-        let [a, b, c] = self.corners.map(|p| p.as_dvec3());
-        let t = self.face(o).distance(d);
-        // Edge-on the quotient is infinite or undefined: a triangle seen edge-on is not there.
-        if !(t > 0.0 && t <= limit && t.is_finite()) {
-            return None;
-        }
-        let (a, b, c) = (a - o, b - o, c - o);
+    pub(super) fn is_crossed(&self, o: DVec3, d: DVec3, t: f64) -> bool {
+        let [a, b, c] = self.corners.map(|p| p.as_dvec3() - o);
         let edges = [d.dot(c.cross(b)), d.dot(a.cross(c)), d.dot(b.cross(a))];
         let one_side = edges.iter().all(|&e| e >= 0.0) || edges.iter().all(|&e| e <= 0.0);
         if !one_side {
-            return None;
+            return false;
         }
         let (low, high) = (a.min(b).min(c), a.max(b).max(c));
         let (at, around) = (t * d, AROUND * low.abs().max(high.abs()).max_element());
-        (at.cmpge(low - around).all() && at.cmple(high + around).all()).then_some(t)
+        at.cmpge(low - around).all() && at.cmple(high + around).all()
     }
 
     /// True when the segment from `o` along `d` crosses the triangle, edges included and ends excluded.

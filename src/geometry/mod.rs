@@ -114,8 +114,10 @@ impl Geometry {
 
     /// The first surface along `ray`; equal distances go to the lower primitive number.
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
-        let best = self.mesh.closest_hit(ray);
-        if self.spheres.is_empty() && self.planes.is_empty() { best } else { self.closest_of_all(ray, best) }
+        if self.spheres.is_empty() && self.planes.is_empty() {
+            return self.mesh.closest_hit(ray);
+        }
+        self.closest_of_all(ray, self.mesh.closest_hit(ray))
     }
 
     /// What [`Geometry::closest_hit`] gives for each of `rays`, to `hits`, of the same length. Rays from one point go

@@ -23,6 +23,8 @@ use smallvec::SmallVec;
 
 /// Rays of a packet: the lanes of a vector.
 const RAYS: usize = 16;
+/// Packets whose rays are put into lanes beforehand: the processor waits for lanes that were written just before.
+const AHEAD: usize = 16;
 /// The bits of all of them.
 const ALL: u32 = (1 << RAYS) - 1;
 /// Coordinates of directions that differ by more than this make a shaft of no use.
@@ -48,50 +50,57 @@ impl Kernel for Packets<'_> {
     #[inline(always)]
     fn run<I: Isa>(self) {
         let mut work = Work::default();
-        for (rays, hits) in self.rays.chunks(RAYS).zip(self.hits.chunks_mut(RAYS)) {
-            match Directions::common::<I>(self.mesh, rays) {
-                Some(directions) => Search::<I>::new(self.mesh, rays, &directions, &mut work).run(rays, hits),
-                None => rays.iter().zip(hits).for_each(|(ray, hit)| *hit = self.mesh.closest_hit(ray)),
+        let mut lanes = [Lanes::default(); AHEAD];
+        for (rays, hits) in self.rays.chunks(AHEAD * RAYS).zip(self.hits.chunks_mut(AHEAD * RAYS)) {
+            for (rays, lanes) in rays.chunks(RAYS).zip(&mut lanes) {
+                lanes.fill(self.mesh, rays);
+            }
+            for ((rays, hits), lanes) in rays.chunks(RAYS).zip(hits.chunks_mut(RAYS)).zip(&lanes) {
+                match lanes.directions::<I>() {
+                    Some(directions) => Search::<I>::new(self.mesh, rays, &directions, &mut work).run(rays, hits),
+                    None => rays.iter().zip(hits).for_each(|(ray, hit)| *hit = self.mesh.closest_hit(ray)),
+                }
             }
         }
     }
 }
 
-/// The directions of a packet, by axis, as the mesh sees them; unused lanes repeat the first.
-struct Directions {
+/// The directions of a packet in lanes, by axis; unused ones repeat the first.
+#[derive(Clone, Copy, Default)]
+struct Lanes {
     each: [[f32; RAYS]; 3],
+    /// True when all start in one point near the mesh.
+    common: bool,
+}
+
+impl Lanes {
+    #[inline(always)]
+    fn fill(&mut self, mesh: &Mesh, rays: &[Ray]) {
+        let first = &rays[0];
+        self.common = rays.len() >= RAYS / 2 && !mesh.is_empty() && mesh.is_near(first.origin);
+        let [x, y, z] = &mut self.each;
+        for lane in 0..RAYS {
+            let Ray { origin, direction } = rays.get(lane).unwrap_or(first);
+            self.common &= *origin == first.origin;
+            (x[lane], y[lane], z[lane]) = (direction.x as f32, direction.y as f32, direction.z as f32);
+        }
+    }
+
+    /// With the box around them, if it is small.
+    #[inline(always)]
+    fn directions<I: Isa>(&self) -> Option<Directions<'_>> {
+        let [x, y, z] = [range::<I>(&self.each[0]), range::<I>(&self.each[1]), range::<I>(&self.each[2])];
+        let close = |(least, most): (f32, f32)| most - least < COHERENT;
+        let all_close = self.common && close(x) && close(y) && close(z);
+        all_close.then_some(Directions { each: &self.each, least: [x.0, y.0, z.0], most: [x.1, y.1, z.1] })
+    }
+}
+
+/// The directions of a packet, as the mesh sees them.
+struct Directions<'a> {
+    each: &'a [[f32; RAYS]; 3],
     least: [f32; 3],
     most: [f32; 3],
-}
-
-impl Directions {
-    /// Of `rays`, if they start in one point near the mesh and lie close together.
-    #[inline(always)]
-    fn common<I: Isa>(mesh: &Mesh, rays: &[Ray]) -> Option<Self> {
-        let Ray { origin, direction } = rays[0];
-        if rays.len() < RAYS / 2 || mesh.is_empty() || !mesh.is_near(origin) {
-            return None;
-        }
-        let mut exact = [[direction.x; RAYS], [direction.y; RAYS], [direction.z; RAYS]];
-        let mut common = true;
-        for (lane, ray) in rays.iter().enumerate().take(RAYS) {
-            common &= ray.origin == origin;
-            for axis in 0..3 {
-                exact[axis][lane] = ray.direction[axis];
-            }
-        }
-        if !common {
-            return None;
-        }
-        let mut d = Directions { each: [[0.0; RAYS]; 3], least: [0.0; 3], most: [0.0; 3] };
-        for axis in 0..3 {
-            for lane in 0..RAYS {
-                d.each[axis][lane] = exact[axis][lane] as f32;
-            }
-            (d.least[axis], d.most[axis]) = range::<I>(&d.each[axis]);
-        }
-        (0..3).all(|axis| d.most[axis] - d.least[axis] < COHERENT).then_some(d)
-    }
 }
 
 /// The least and the greatest lane.
@@ -129,7 +138,7 @@ struct Work {
 struct Search<'a, I: Isa> {
     mesh: &'a Mesh,
     apex: [f32; 3],
-    directions: &'a Directions,
+    directions: &'a [[f32; RAYS]; 3],
     shaft: Shaft,
     d: [I::Sixteen; 3],
     bundle: Bundle<I>,
@@ -142,15 +151,15 @@ struct Search<'a, I: Isa> {
 
 impl<'a, I: Isa> Search<'a, I> {
     #[inline(always)]
-    fn new(mesh: &'a Mesh, rays: &[Ray], directions: &'a Directions, work: &'a mut Work) -> Self {
+    fn new(mesh: &'a Mesh, rays: &[Ray], directions: &Directions<'a>, work: &'a mut Work) -> Self {
         let apex = rays[0].origin.as_vec3().to_array();
-        let [x, y, z] = &directions.each;
+        let [x, y, z] = directions.each;
         let d = [I::Sixteen::load(x), I::Sixteen::load(y), I::Sixteen::load(z)];
         let mut ends = [f32::INFINITY; RAYS];
         ends.iter_mut().skip(rays.len()).for_each(|end| *end = -1.0);
         let shaft = Shaft::along(apex, directions.least, directions.most);
         let bundle = Bundle::new(&shaft, &d);
-        Search { mesh, apex, directions, shaft, d, bundle, work, ends, end: f32::INFINITY }
+        Search { mesh, apex, directions: directions.each, shaft, d, bundle, work, ends, end: f32::INFINITY }
     }
 
     #[inline(always)]
@@ -163,6 +172,7 @@ impl<'a, I: Isa> Search<'a, I> {
                 let (met, enter) = self.shaft.meets_before::<I>(node, self.end);
                 let mut times = [0.0; WIDTH];
                 enter.store(&mut times);
+                self.mesh.prefetch(node, met);
                 self.work.open.push(number, met, &times);
             }
             let Some((_, number, slot)) = self.work.open.pop(self.end) else { return self.finish(rays, hits) };
@@ -241,7 +251,7 @@ impl<'a, I: Isa> Search<'a, I> {
 
     #[inline(always)]
     fn direction(&self, lane: usize) -> DVec3 {
-        let [x, y, z] = &self.directions.each;
+        let [x, y, z] = self.directions;
         Vec3::new(x[lane], y[lane], z[lane]).as_dvec3()
     }
 

@@ -68,6 +68,13 @@ impl Block {
         }
         block
     }
+
+    /// The triangle in `lane`.
+    #[inline(always)]
+    pub(super) fn triangle(&self, lane: usize) -> [Vec3; 3] {
+        let corner = |[x, y, z]: &[[f32; WIDTH]; 3]| Vec3::new(x[lane], y[lane], z[lane]);
+        [corner(&self.corners[0]), corner(&self.corners[1]), corner(&self.corners[2])]
+    }
 }
 
 /// A box of directions from the apex, by centre and half extent \[m\]: every d of a bundle lies inside.

@@ -1,36 +1,36 @@
 //! Single rays through the mesh: the closest triangle, and whether any is met.
 //!
-//! A ray asks eight boxes at once, and goes into the nearest first; then eight triangles at once. With (x, y) the corners across
-//! the ray, in the frame of two unit vectors at right angles to it, the areas of the triangles between the ray and each edge,
+//! A ray asks eight boxes at once, and goes into the nearest first; then eight triangles at once, sheared so that it runs along
+//! an axis z, the one nearest to its direction. With (x, y) the corners seen from there, the areas of the triangles between the
+//! ray and each edge,
 //!
 //! ```text
 //! U = c_x b_y - c_y b_x,   V = a_x c_y - a_y c_x,   W = b_x a_y - b_y a_x
 //! ```
 //!
-//! have one sign where the line crosses the triangle; N . a / N . d is where. Both are in f32 with certain bounds, so that f64
-//! computes the distance of what is nearest, mostly one triangle, and is asked whether it is crossed at all only where the ray
-//! passes an edge too closely.
+//! have one sign where the line crosses the triangle. They are in f32 with a tolerance: where all three are certain, f64 only
+//! computes the distance; where they are not, it decides too.
 //!
-//! With u = 2^-24, M an upper bound of how far the corners are, L the longest side of the box around them, and the ray within L/2
-//! of this box (boxes are inflated more than their test rounds), |x| and |y| are at most 2.3 L. Their errors are at most 14 u M: 1
-//! of the corner, 6 of the scalar product, 6 because the frame is rounded and the ray not quite at right angles to it, 1 to spare.
-//! Those of the areas are 4 x 2.3 L times that, and 4 u (2.3 L)^2 for their own rounding: 130 u M L + 24 u L^2. The errors of N . a and
-//! N . d are those in [`super::planes`].
+//! With u = 2^-24, M an upper bound of how far the corners are along any axis, L the longest side of the box around them, and the
+//! ray within 0.7 L of this box (boxes are inflated by more than half of what their tests round and allow), |x| and |y| are at
+//! most 3.4 L. Their errors are 5 u M + 3.4 u L: 1 of x, 1 of z, 2 of the shear, 1 of the product where it is not fused, and that of
+//! the result. Those of the areas are 4 x 3.4 L times that, and 4 u (3.4 L)^2 for their own rounding: 68 u M L + 93 u L^2. What
+//! f64 rounds is far less. The tolerance is 72 u M L + 96 u L^2.
 
 use super::bvh::{Node, WIDTH};
-use super::mesh::{Face, Mesh, Open, bits};
-use super::planes::{Block, FACE, U, dot, load, splat, sub};
+use super::mesh::{Face, Leaf, Mesh, Open, Triangle, bits};
+use super::planes::{Block, U, splat};
 use super::simd::{Isa, Kernel, Vector};
 use super::{Hit, Ray};
 use crate::math::{DVec3, Vec3};
-use arrayvec::ArrayVec;
 use smallvec::SmallVec;
+use std::hint::black_box;
 
 /// Stands for 0 where one divides by a coordinate of a direction: far below what boxes are inflated by.
 const NIL: f32 = 1e-20;
 
-/// Tolerance of the areas in units of u M L.
-const ACROSS: f32 = 130.0;
+/// The axes with the one that a ray runs along last.
+const ORDERS: [[usize; 3]; 3] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]];
 
 /// A ray in f32 on its way through the boxes.
 struct BoxRay<I: Isa> {
@@ -67,91 +67,65 @@ impl<I: Isa> BoxRay<I> {
     }
 }
 
-/// How a ray meets eight triangles: the ones that it may cross, and the ones that it surely does, at distances
-/// between `early` and `late`, in lengths of its direction.
-struct Meeting {
+/// Of eight triangles, the ones whose inside a line may cross, and the ones that it surely does.
+struct Crossed {
     may: u32,
     sure: u32,
-    early: [f32; WIDTH],
-    late: [f32; WIDTH],
 }
 
-/// A ray in f32 on its way through the triangles.
+/// A ray in f32 on its way through the triangles, its coordinates in the order x, y, z of the sheared space.
 struct Sight<I: Isa> {
+    axes: [usize; 3],
     origin: [I::Eight; 3],
-    direction: [I::Eight; 3],
-    /// Two unit vectors across the direction.
-    across: [[I::Eight; 3]; 2],
+    /// What x and y lose per z.
+    shear: [I::Eight; 2],
     /// |d|, a little more.
     length: f32,
-    floor: f32,
 }
 
 impl<I: Isa> Sight<I> {
     /// Along a direction that is `length` long.
     #[inline(always)]
-    fn new(origin: Vec3, direction: Vec3, length: f32, floor: f32) -> Self {
-        let Vec3 { x, y, z } = direction / length;
-        // The frame of Duff et al. 2017.
-        let sign = 1f32.copysign(z);
-        let a = -1.0 / (sign + z);
-        let b = x * y * a;
-        let across = [[1.0 + sign * x * x * a, sign * b, -sign * x], [b, sign + y * y * a, -y]];
+    fn new(origin: Vec3, direction: Vec3, length: f32) -> Self {
+        let size = direction.abs();
+        let steep = usize::from(size.z > size.x && size.z > size.y);
+        let axes = ORDERS[2 * steep + (1 - steep) * usize::from(size.y > size.x)];
+        // In memory an index is no branch; which axis it is nobody can predict.
+        let (o, d) = (black_box(origin.to_array()), black_box(direction.to_array()));
+        let slope = -1.0 / d[axes[2]];
         Sight {
-            origin: splat::<I>(origin.to_array()),
-            direction: splat::<I>(direction.to_array()),
-            across: [splat::<I>(across[0]), splat::<I>(across[1])],
+            axes,
+            origin: splat::<I>([o[axes[0]], o[axes[1]], o[axes[2]]]),
+            shear: [I::Eight::splat(d[axes[0]] * slope), I::Eight::splat(d[axes[1]] * slope)],
             length: length * (1.0 + 8.0 * U),
-            floor,
         }
     }
 
-    /// Box `slot` of `node`, which the ray enters at `time`.
+    /// The triangles of a block, whose box the ray enters at `time`.
     #[inline(always)]
-    fn meets(&self, block: &Block, node: &Node, slot: usize, time: f32) -> Option<Meeting> {
-        let side = |axis: usize| node.high[axis][slot] - node.low[axis][slot];
-        let greater = |a: f32, b: f32| if a > b { a } else { b };
-        let edge = greater(greater(side(0), side(1)), side(2));
-        let far = time * self.length + 2.0 * edge;
+    fn crosses(&self, block: &Block, leaf: Leaf, time: f32) -> Crossed {
         let [a, b, c] = [self.seen(block, 0), self.seen(block, 1), self.seen(block, 2)];
         let [u, v, w] = [area::<I>(&c, &b), area::<I>(&a, &c), area::<I>(&b, &a)];
         let (least, most) = (u.min(v).min(w), u.max(v).max(w));
-        let tolerance = (ACROSS * far + 24.0 * edge) * edge * U;
+        let far = time * self.length + 2.0 * leaf.edge;
+        let tolerance = (72.0 * far + 96.0 * leaf.edge) * leaf.edge * U;
         let (above, below) = (I::Eight::splat(tolerance), I::Eight::splat(-tolerance));
         let outside = least.less(below) & above.less(most);
-        let there = (1u32 << node.triangles[slot]) - 1;
-        if !outside & there == 0 {
-            return None;
-        }
-        let normal = load::<I>(&block.normal);
-        let volume = dot::<I>(normal, a.from);
-        let toward = dot::<I>(normal, self.direction).flip(volume);
-        let volume = volume.abs();
-        let face = I::Eight::splat(FACE * far + self.floor);
-        let slope = I::Eight::splat(FACE * self.length);
-        let doubtful = volume.less(face);
-        let away = toward.less(I::Eight::splat(-FACE * self.length)) & !doubtful;
-        let may = !(outside | away) & there;
-        if may == 0 {
-            return None;
-        }
         let inside = above.less(least) | most.less(below);
-        let (mut early, mut late) = ([0.0; WIDTH], [0.0; WIDTH]);
-        volume.sub(face).mul(I::Eight::splat(1.0 - 8.0 * U)).div(toward.add(slope)).store(&mut early);
-        volume.add(face).mul(I::Eight::splat(1.0 + 8.0 * U)).div(toward.sub(slope)).store(&mut late);
-        Some(Meeting { may, sure: may & inside & !doubtful & slope.less(toward), early, late })
+        Crossed { may: !outside & leaf.lanes, sure: inside }
     }
 
     #[inline(always)]
     fn seen(&self, block: &Block, corner: usize) -> Corner<I> {
-        let from = sub::<I>(load::<I>(&block.corners[corner]), self.origin);
-        Corner { x: dot::<I>(from, self.across[0]), y: dot::<I>(from, self.across[1]), from }
+        let rows = &block.corners[corner];
+        let from = |k: usize| I::Eight::load(&rows[self.axes[k]]).sub(self.origin[k]);
+        let z = from(2);
+        Corner { x: z.mul_add(self.shear[0], from(0)), y: z.mul_add(self.shear[1], from(1)) }
     }
 }
 
-/// Corners of eight triangles, seen from the origin of a ray.
+/// Corners of eight triangles across a ray.
 struct Corner<I: Isa> {
-    from: [I::Eight; 3],
     x: I::Eight,
     y: I::Eight,
 }
@@ -159,6 +133,14 @@ struct Corner<I: Isa> {
 #[inline(always)]
 fn area<I: Isa>(p: &Corner<I>, q: &Corner<I>) -> I::Eight {
     p.x.mul_sub(q.y, p.y.mul(q.x))
+}
+
+/// The same ray, its coordinates read one by one: the processor waits for the caller to have written them where it wrote them in
+/// pairs and they are read in others.
+#[inline(always)]
+fn one_by_one(ray: &Ray) -> Ray {
+    let read = |v: &DVec3| DVec3::new(black_box(v.x), black_box(v.y), black_box(v.z));
+    Ray { origin: read(&ray.origin), direction: read(&ray.direction) }
 }
 
 /// The first triangle along a ray that starts near the mesh.
@@ -173,88 +155,63 @@ impl Kernel for Closest<'_> {
     #[inline(always)]
     fn run<I: Isa>(self) -> Option<Hit> {
         let Closest { mesh, ray } = self;
+        let ray = one_by_one(ray);
         // Boxes and triangles must see the same ray, or it could pass between a box and its triangle.
         let (origin, direction) = (ray.origin.as_vec3(), ray.direction.as_vec3());
         let (o, d) = (origin.as_dvec3(), direction.as_dvec3());
-        let (boxes, sight) = (BoxRay::<I>::new(origin, direction), Sight::<I>::new(origin, direction, 1.0, mesh.floor));
-        let mut candidates = Candidates { crossed: ArrayVec::new(), end: f32::INFINITY };
+        let (boxes, sight) = (BoxRay::<I>::new(origin, direction), Sight::<I>::new(origin, direction, 1.0));
+        let mut best = Best { distance: f64::MAX, end: f32::INFINITY, found: None };
         let mut open = Open::default();
         let mut next = if mesh.is_empty() { None } else { Some(0) };
         loop {
             if let Some(number) = next.take() {
-                let (met, times) = boxes.meets(&mesh.bvh.nodes[number as usize], candidates.end);
+                let node = &mesh.bvh.nodes[number as usize];
+                let (met, times) = boxes.meets(node, best.end);
+                mesh.prefetch(node, met);
                 open.push(number, met, &times);
             }
-            let Some((time, number, slot)) = open.pop(candidates.end) else { break };
+            let Some((time, number, slot)) = open.pop(best.end) else { break };
             let node = &mesh.bvh.nodes[number];
             let child = node.child[slot];
             if node.blocks >> slot & 1 == 0 {
                 next = Some(child);
-            } else if let Some(meeting) = sight.meets(&mesh.blocks[child as usize], node, slot, time) {
-                candidates.add(mesh, mesh.bvh.firsts[child as usize], &meeting, o, d);
+                continue;
+            }
+            let (block, leaf) = (&mesh.blocks[child as usize], mesh.leaves[child as usize]);
+            let crossed = sight.crosses(block, leaf, time);
+            for lane in bits(crossed.may) {
+                let triangle =
+                    Triangle { corners: block.triangle(lane), primitive: mesh.bvh.order[leaf.first as usize + lane] };
+                best.offer(triangle, crossed.sure >> lane & 1 == 1, o, d);
             }
         }
-        let (t, primitive, face) = candidates.nearest(mesh, o, d)?;
-        Some(face.hit(ray, t, primitive, face.unit()))
+        let (primitive, face) = best.found?;
+        Some(face.hit(&ray, best.distance, primitive, face.unit()))
     }
 }
 
-/// Triangles that a ray crosses.
-struct Candidates {
-    /// Lower bounds of the distance, and places.
-    crossed: ArrayVec<(f32, u32), 16>,
-    /// An upper bound of the distance of the nearest.
+/// The nearest triangle so far.
+struct Best {
+    distance: f64,
+    /// The distance rounded up: a box that begins there may hold a lower primitive number.
     end: f32,
+    found: Option<(u32, Face)>,
 }
 
-impl Candidates {
-    /// Takes the triangles of a block from place `first` on.
+impl Best {
+    /// Takes the triangle if the ray meets it before any other; where `inside`, its line surely crosses it.
     #[inline(always)]
-    fn add(&mut self, mesh: &Mesh, first: u32, meeting: &Meeting, o: DVec3, d: DVec3) {
-        for lane in bits(meeting.may) {
-            let place = first + lane as u32;
-            let (early, late) = match meeting.sure >> lane & 1 {
-                1 => (meeting.early[lane], meeting.late[lane]),
-                _ => match mesh.triangles[place as usize].intersect(o, d, f64::INFINITY) {
-                    Some(t) => ((t * (1.0 - 1e-6)) as f32, (t * (1.0 + 1e-6)) as f32),
-                    None => continue,
-                },
-            };
-            if early <= self.end {
-                self.end = if late < self.end { late } else { self.end };
-                if self.crossed.is_full() {
-                    self.decide(mesh, o, d);
-                }
-                self.crossed.push((early, place));
-            }
+    fn offer(&mut self, triangle: Triangle, inside: bool, o: DVec3, d: DVec3) {
+        let face = triangle.face(o);
+        let t = face.distance(d);
+        // Edge-on the quotient is infinite or undefined.
+        if !(t > 0.0 && t <= self.distance) || !(inside || triangle.is_crossed(o, d, t)) {
+            return;
         }
-    }
-
-    /// Keeps the nearest alone.
-    #[cold]
-    #[inline(never)]
-    fn decide(&mut self, mesh: &Mesh, o: DVec3, d: DVec3) {
-        let nearest =
-            self.nearest(mesh, o, d).map(|(t, primitive, _)| ((t * (1.0 - 1e-6)) as f32, mesh.place(primitive)));
-        self.crossed.clear();
-        self.crossed.extend(nearest);
-    }
-
-    /// Distance, primitive and plane of the nearest, the lower primitive of equals.
-    #[inline(always)]
-    fn nearest(&self, mesh: &Mesh, o: DVec3, d: DVec3) -> Option<(f64, u32, Face)> {
-        let mut best: Option<(f64, u32, Face)> = None;
-        for &(early, place) in &self.crossed {
-            if early <= self.end {
-                let triangle = &mesh.triangles[place as usize];
-                let face = triangle.face(o);
-                let t = face.distance(d);
-                if best.as_ref().is_none_or(|&(least, primitive, _)| (t, triangle.primitive) < (least, primitive)) {
-                    best = Some((t, triangle.primitive, face));
-                }
-            }
+        if t < self.distance || self.found.as_ref().is_none_or(|&(primitive, _)| triangle.primitive < primitive) {
+            (self.distance, self.end) = (t, (t * (1.0 + 1e-6)) as f32);
+            self.found = Some((triangle.primitive, face));
         }
-        best
     }
 }
 
@@ -273,8 +230,9 @@ impl Kernel for Any<'_> {
         let Any { mesh, origin, direction } = self;
         let (o, d) = (origin.as_dvec3(), direction.as_dvec3());
         let length = direction.dot(direction).sqrt();
-        let (ray, sight) =
-            (BoxRay::<I>::new(origin, direction), Sight::<I>::new(origin, direction, length, mesh.floor));
+        // Of points that are all but one nothing is certain, and NaN says so.
+        let length = if length > 1e-15 { length } else { f32::NAN };
+        let (ray, sight) = (BoxRay::<I>::new(origin, direction), Sight::<I>::new(origin, direction, length));
         let mut open: SmallVec<[u32; 96]> = SmallVec::new();
         if !mesh.is_empty() {
             open.push(0);
@@ -284,13 +242,14 @@ impl Kernel for Any<'_> {
             let (met, times) = ray.meets(node, 1.0);
             for slot in bits(met & node.blocks) {
                 let child = node.child[slot] as usize;
-                let Some(meeting) = sight.meets(&mesh.blocks[child], node, slot, times[slot]) else { continue };
-                let first = mesh.bvh.firsts[child] as usize;
-                let crosses = |lane: usize| match meeting.sure >> lane & 1 == 1 && meeting.late[lane] < 1.0 {
-                    true => true,
-                    false => mesh.triangles[first + lane].crosses(o, d),
+                let (block, leaf) = (&mesh.blocks[child], mesh.leaves[child]);
+                let crossed = sight.crosses(block, leaf, times[slot]);
+                let blocks = |lane: usize| {
+                    let triangle = Triangle { corners: block.triangle(lane), primitive: 0 };
+                    let t = triangle.face(o).distance(d);
+                    t > 0.0 && t < 1.0 && (crossed.sure >> lane & 1 == 1 || triangle.is_crossed(o, d, t))
                 };
-                if bits(meeting.may).any(crosses) {
+                if bits(crossed.may).any(blocks) {
                     return true;
                 }
             }

@@ -95,6 +95,11 @@ impl Path {
         })
     }
 
+    /// The path for kernels without vectors of sixteen, which gain nothing from AVX-512.
+    pub fn for_eights(self) -> Path {
+        if self == Path::Avx512 { Path::Avx2 } else { self }
+    }
+
     /// Runs `kernel` compiled for these instructions.
     ///
     /// # Panics
@@ -111,7 +116,7 @@ impl Path {
                 assert!(self.is_available(), "no AVX2 here");
                 unsafe { run_avx2(kernel) }
             }
-            Path::Scalar => kernel.run::<Scalar>(),
+            Path::Scalar => run_scalar(kernel),
         }
     }
 }
@@ -133,6 +138,12 @@ pub(super) fn prefetch<T>(what: &T) {
         // SAFETY: a prefetch reads nothing; SSE is part of every x86-64 processor.
         unsafe { _mm_prefetch::<_MM_HINT_T0>((what as *const T).cast::<i8>().wrapping_add(64 * line)) }
     }
+}
+
+/// Not inlined, as the others cannot be: what calls a kernel stays small.
+#[inline(never)]
+fn run_scalar<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run::<Scalar>()
 }
 
 /// A computation that is compiled for every [`Isa`].
