@@ -20,7 +20,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Histories that share a continuation of each receiver: chosen by measured figure of merit (docs/benchmarks.md).
-const HISTORIES_OF_A_PATH: usize = 2;
+const HISTORIES_OF_A_PATH: usize = 4;
 /// Bins that are scored together.
 const BLOCK: usize = 64 * TILE;
 

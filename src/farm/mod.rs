@@ -31,6 +31,7 @@ pub mod realization;
 mod receivers;
 mod regions;
 pub mod status;
+mod thinning;
 pub mod worker;
 
 #[cfg(test)]

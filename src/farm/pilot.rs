@@ -16,7 +16,7 @@ use crate::transport::receiver::Receiver;
 use crate::transport::trajectory::{Vertex, trace};
 
 /// c: chosen by measured figure of merit (docs/benchmarks.md).
-const SCORE_OF_A_HISTORY: f64 = 3.0;
+const SCORE_OF_A_HISTORY: f64 = 10.0;
 /// Trajectories of a pilot.
 const TRAJECTORIES: u64 = 1024;
 /// Bins of a set at which a pilot estimates.

@@ -8,8 +8,9 @@
 use super::local;
 use super::receivers::{CentreSight, ReceiverSet};
 use super::regions::Regions;
+use super::thinning::thinned;
 use crate::geometry::kd_order;
-use crate::job::{Channels, Estimator, Job, Sampling};
+use crate::job::{Channels, Estimator, Job, Run, Sampling};
 use crate::random::sobol::PointSet;
 use crate::random::{Domain, Stream};
 use crate::scene::Scene;
@@ -19,8 +20,8 @@ use crate::transport::trajectory::{FluxBalance, Record, Segment, Vertex, trace};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Histories traced by one thread at a time.
-const HISTORIES_AT_ONCE: u64 = 64;
+/// Trajectories traced by one thread at a time.
+const TRAJECTORIES_AT_ONCE: u64 = 64;
 
 /// Everything that is the same for every batch of a job.
 pub struct Realization<'a> {
@@ -34,6 +35,7 @@ pub struct Realization<'a> {
     fixed_direct: Vec<Vec<f64>>,
     trajectories: Stream,
     scrambling: Stream,
+    thinning: Stream,
     orders: Range<u32>,
 }
 
@@ -49,8 +51,20 @@ impl<'a> Realization<'a> {
         fixed_direct.resize_with(sets.len() + regions.len(), Vec::new);
         let trajectories = Stream::new(job.run.seed, Domain::Trajectory, "");
         let scrambling = Stream::new(job.run.seed, Domain::Scrambling, "");
+        let thinning = Stream::new(job.run.seed, Domain::Thinning, "");
         let orders = 1..u32::MAX;
-        Realization { job, scene, sets, regions, orders_of_bins, fixed_direct, trajectories, scrambling, orders }
+        Realization {
+            job,
+            scene,
+            sets,
+            regions,
+            orders_of_bins,
+            fixed_direct,
+            trajectories,
+            scrambling,
+            thinning,
+            orders,
+        }
     }
 
     /// The same realization with only the vertices x_n, n in `orders`, connected: for tests order by order.
@@ -73,7 +87,7 @@ impl<'a> Realization<'a> {
             Estimator::DirectSimulation => self.direct_simulation(index),
         };
         sets.extend(self.regions.scores(&sets));
-        BatchScores { sets, flux: flux.scores(1.0 / self.job.run.histories_per_batch as f64) }
+        BatchScores { sets, flux: flux.scores(1.0 / self.job.run.trajectories_per_batch() as f64) }
     }
 
     /// Scores by connections from trajectories to receivers.
@@ -100,28 +114,33 @@ impl<'a> Realization<'a> {
 
     /// Scores by counting trajectories on the cells of the grids, the only receivers of such a job.
     fn direct_simulation(&self, index: u64) -> (Vec<Scores>, FluxBalance) {
-        let traced = self.trace::<Vec<Segment>>(index);
-        let mut flux = FluxBalance::default();
-        traced.iter().for_each(|(_, balance)| flux.add(balance));
+        let traced = self.trace::<Segment>(index);
+        let flux = balance(&traced);
         let sets = self.sets.par_iter().zip(&self.job.grids);
-        let count = |(set, grid): (&ReceiverSet, _)| set.counted(self.scene, grid, traced.iter().map(|(s, _)| s));
+        let count =
+            |(set, grid): (&ReceiverSet, _)| set.counted(self.scene, grid, traced.iter().flat_map(Traced::histories));
         (sets.map(count).collect(), flux)
     }
 
     /// The histories of a batch as connectors.
     fn connectors(&self, index: u64) -> (Connectors, FluxBalance) {
-        let mut connectors = Connectors::default();
-        let mut flux = FluxBalance::default();
-        for (vertices, balance) in &self.trace::<Vec<Vertex>>(index) {
-            connectors.push(self.scene, vertices);
-            flux.add(balance);
-        }
-        (connectors, flux)
+        let traced = self.trace::<Vertex>(index);
+        let Run { histories_per_batch, thinning, .. } = self.job.run;
+        let connectors = if thinning > 1 {
+            let vertices: Vec<&Vertex> = traced.iter().flat_map(|t| &t.records).collect();
+            let rng = &mut self.thinning.generator(index);
+            thinned(self.scene, &vertices, histories_per_batch as usize, thinning as usize, rng)
+        } else {
+            let mut connectors = Connectors::default();
+            traced.iter().flat_map(Traced::histories).for_each(|vertices| connectors.push(self.scene, vertices));
+            connectors
+        };
+        (connectors, balance(&traced))
     }
 
     /// The quasi-random set of a batch, where the job asks for one.
     fn points(&self, batch: u64) -> Option<PointSet> {
-        let count = self.job.run.histories_per_batch;
+        let count = self.job.run.trajectories_per_batch();
         let set = || {
             assert!(count.is_power_of_two(), "the job was checked: {count} histories");
             PointSet::new(&self.scrambling, batch, count.ilog2())
@@ -129,35 +148,58 @@ impl<'a> Realization<'a> {
         (self.job.run.sampling == Sampling::Rqmc).then(set)
     }
 
-    /// Traces the histories of a batch; their records in the order of their index.
-    fn trace<R: Record + Default + Send>(&self, index: u64) -> Vec<(R, FluxBalance)> {
-        let count = self.job.run.histories_per_batch;
+    /// Traces the trajectories of a batch, in the order of their index.
+    fn trace<T: Send>(&self, index: u64) -> Vec<Traced<T>>
+    where
+        Vec<T>: Record,
+    {
+        let count = self.job.run.trajectories_per_batch();
         let points = self.points(index);
-        let starts: Vec<u64> = (0..count).step_by(HISTORIES_AT_ONCE as usize).collect();
-        let some = |start| self.trace_some(index, start..(start + HISTORIES_AT_ONCE).min(count), points.as_ref());
-        let traced: Vec<Vec<_>> = starts.into_par_iter().map(some).collect();
-        traced.into_iter().flatten().collect()
+        let starts: Vec<u64> = (0..count).step_by(TRAJECTORIES_AT_ONCE as usize).collect();
+        let some = |start| self.trace_some(index, start..(start + TRAJECTORIES_AT_ONCE).min(count), points.as_ref());
+        starts.into_par_iter().map(some).collect()
     }
 
-    /// Traces the histories `range` of a batch; history i starts with point i of `points`.
-    fn trace_some<R: Record + Default>(
-        &self,
-        batch: u64,
-        range: Range<u64>,
-        points: Option<&PointSet>,
-    ) -> Vec<(R, FluxBalance)> {
-        let first = batch * self.job.run.histories_per_batch;
-        let trace = |i: u64| {
-            let mut record = R::default();
+    /// Traces the trajectories `range` of a batch; number i starts with point i of `points`.
+    fn trace_some<T>(&self, batch: u64, range: Range<u64>, points: Option<&PointSet>) -> Traced<T>
+    where
+        Vec<T>: Record,
+    {
+        let first = batch * self.job.run.trajectories_per_batch();
+        let mut traced = Traced { records: Vec::new(), ends: Vec::new(), flux: FluxBalance::default() };
+        for i in range {
             let mut rng = self.trajectories.generator(first + i);
             if let Some(points) = points {
                 rng = rng.after(points.point(i as u32));
             }
-            let flux = trace(self.scene, &self.job.transport, &mut rng, &mut record);
-            (record, flux)
-        };
-        range.map(trace).collect()
+            traced.flux.add(&trace(self.scene, &self.job.transport, &mut rng, &mut traced.records));
+            traced.ends.push(traced.records.len());
+        }
+        traced
     }
+}
+
+/// What some trajectories left behind, one after the other.
+struct Traced<T> {
+    records: Vec<T>,
+    /// Where the records of each trajectory end.
+    ends: Vec<usize>,
+    flux: FluxBalance,
+}
+
+impl<T> Traced<T> {
+    /// The records of each trajectory.
+    fn histories(&self) -> impl Iterator<Item = &[T]> {
+        let starts = std::iter::once(0).chain(self.ends.iter().copied());
+        starts.zip(&self.ends).map(|(start, &end)| &self.records[start..end])
+    }
+}
+
+/// The fate of the flux of all trajectories.
+fn balance<T>(traced: &[Traced<T>]) -> FluxBalance {
+    let mut flux = FluxBalance::default();
+    traced.iter().for_each(|t| flux.add(&t.flux));
+    flux
 }
 
 /// The surface seen in the centre of each pixel.

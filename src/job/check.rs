@@ -7,6 +7,8 @@ use std::fmt::Debug;
 
 /// Largest picture: 2^28 pixels.
 const MAX_BINS: u64 = 1 << 28;
+/// Most trajectories of a batch.
+const MAX_TRAJECTORIES: u64 = 1 << 20;
 /// Largest coordinate \[m\]: beyond it positions in f32 say little.
 const MAX_METRES: f64 = 1e6;
 /// Fewest batches of quasi-random sets: only batches tell the error, and fewer tell it badly.
@@ -144,7 +146,11 @@ fn check_monitor(c: &Checker, at: &str, monitor: &[[u32; 2]], width: u32, height
 fn check_run(c: &Checker, job: &Job) -> Result<()> {
     let run = &job.run;
     c.that("run.seed", run.seed, run.seed < 1 << 63, "0 .. 9223372036854775807")?;
-    c.range("run.histories_per_batch", run.histories_per_batch, 1, 1 << 20)?;
+    c.range("run.histories_per_batch", run.histories_per_batch, 1, MAX_TRAJECTORIES)?;
+    c.range("run.thinning", run.thinning, 1, MAX_TRAJECTORIES / run.histories_per_batch)?;
+    let local = job.transport.estimator == Estimator::Local;
+    let allowed = "1 with estimators other than \"local\", which connect nothing";
+    c.that("run.thinning", run.thinning, local || run.thinning == 1, allowed)?;
     c.range("run.batches", run.batches, 1, 1 << 32)?;
     c.range("run.batches_per_shard", run.batches_per_shard, 1, 1 << 20)?;
     c.that(
@@ -171,10 +177,11 @@ fn check_sampling(c: &Checker, job: &Job) -> Result<()> {
     let reverse = job.transport.estimator == Estimator::Reverse;
     let allowed = "\"random\" with estimator = \"reverse\", whose paths are independent";
     c.that("run.sampling", "rqmc", !reverse, allowed)?;
-    let n = run.histories_per_batch;
-    let (below, above) = (1u64 << n.ilog2(), n.next_power_of_two());
-    let allowed = format!("a power of two: {below} or {above}; any number with sampling = \"random\"");
-    c.that("run.histories_per_batch", n, n.is_power_of_two(), &allowed)?;
+    for (field, n) in [("run.histories_per_batch", run.histories_per_batch), ("run.thinning", run.thinning)] {
+        let (below, above) = (1u64 << n.ilog2(), n.next_power_of_two());
+        let allowed = format!("a power of two: {below} or {above}; any number with sampling = \"random\"");
+        c.that(field, n, n.is_power_of_two(), &allowed)?;
+    }
     let enough = job.stop.is_some() || run.batches >= MIN_RQMC_BATCHES;
     let allowed = format!("at least {MIN_RQMC_BATCHES}; any number with sampling = \"random\"");
     c.that("run.batches", run.batches, enough, &allowed)

@@ -61,6 +61,13 @@ pub struct Job {
 const HISTORIES_OF_MAPS: u64 = 16;
 /// The same in a job of lux-meters alone.
 const HISTORIES_OF_METERS: u64 = 1024;
+/// Bins to which a history is connected for each trajectory traced for it, by default: chosen by measured figure of merit
+/// (docs/benchmarks.md).
+const BINS_OF_A_TRAJECTORY: u64 = 128;
+/// The same for the greatest default of the thinning.
+const MOST_THINNING: u64 = 64;
+/// Trajectories of a batch, at most, by default: their vertices are in memory at once.
+const TRAJECTORIES: u64 = 1 << 16;
 
 /// `[run]`: seed, division of work and confidence.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -72,6 +79,9 @@ pub struct Run {
     /// goniometers, whose pixels need many positions, and so many batches; else 1024, because a quasi-random set gains
     /// with its size (docs/benchmarks.md).
     pub histories_per_batch: u64,
+    /// Trajectories traced for each history that is connected: of their vertices so many are chosen, by their flux and
+    /// place, as one trajectory has on average. Left out: by the number of bins.
+    pub thinning: u64,
     /// Number of batches of the whole job; with `[stop]` its `max_batches`, and not to be typed.
     pub batches: u64,
     /// Shard k holds the batches [k n, k n + n).
@@ -92,6 +102,7 @@ impl Default for Run {
         Run {
             seed: 1,
             histories_per_batch: HISTORIES_OF_METERS,
+            thinning: 1,
             batches: 256,
             batches_per_shard: 32,
             sampling: Sampling::Rqmc,
@@ -99,6 +110,13 @@ impl Default for Run {
             channels: Channels::Luminance,
             checkpoint_seconds: 30.0,
         }
+    }
+}
+
+impl Run {
+    /// Trajectories traced in a batch.
+    pub fn trajectories_per_batch(&self) -> u64 {
+        self.histories_per_batch * self.thinning
     }
 }
 
@@ -279,6 +297,9 @@ impl Job {
         if typed.histories_per_batch.is_none() && job.has_maps() {
             job.run.histories_per_batch = HISTORIES_OF_MAPS;
         }
+        if typed.thinning.is_none() && job.transport.estimator == Estimator::Local {
+            job.run.thinning = job.thinning();
+        }
         if typed.sampling.is_none() && job.transport.estimator == Estimator::Reverse {
             job.run.sampling = Sampling::Random;
         }
@@ -289,6 +310,15 @@ impl Job {
     /// True when the kernel of the local estimate is bounded.
     pub fn is_bounded(&self) -> bool {
         self.transport.estimator == Estimator::Local && self.transport.bounded
+    }
+
+    /// The thinning of a job that does not say: tracing shall cost less than connecting, and memory be kept.
+    fn thinning(&self) -> u64 {
+        let regions = self.regions.len();
+        let sets = self.sets();
+        let bins = sets[..sets.len() - regions].iter().map(|s| s.bins() as u64).fold(0, u64::saturating_add);
+        let most = (TRAJECTORIES / self.run.histories_per_batch.max(1)).clamp(1, MOST_THINNING);
+        1 << (bins / BINS_OF_A_TRAJECTORY).clamp(1, most).ilog2()
     }
 
     /// The field that says how many batches the job has at most.
@@ -317,6 +347,7 @@ impl Job {
 struct Typed {
     batches: Option<u64>,
     histories_per_batch: Option<u64>,
+    thinning: Option<u64>,
     sampling: Option<Sampling>,
 }
 

@@ -30,6 +30,8 @@ pub enum Domain {
     Continuation,
     /// Scrambling of the quasi-random set of a batch; the index is the batch.
     Scrambling,
+    /// Which vertices of a batch are connected; the index is the batch.
+    Thinning,
     /// Scrambling of the points of emitters that the receivers of one set share; the index is `batch * positions + position`.
     Emitter,
     /// Scrambling of the first directions of receiver-side continuations; the index is `batch * bins + bin`.
@@ -46,6 +48,7 @@ impl Domain {
             Domain::Pilot => "lampyris 1 pilot",
             Domain::Continuation => "lampyris 1 continuation",
             Domain::Scrambling => "lampyris 1 scrambling",
+            Domain::Thinning => "lampyris 1 thinning",
             Domain::Emitter => "lampyris 1 emitter",
             Domain::Direction => "lampyris 1 direction",
             Domain::Reverse => "lampyris 1 reverse",

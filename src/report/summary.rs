@@ -31,6 +31,8 @@ pub(super) struct Summary {
     /// What ended the run; `null` without a goal.
     pub stopped_by: Option<StoppedBy>,
     pub histories_per_batch: u64,
+    /// Trajectories traced for each history.
+    pub thinning: u64,
     pub histories: u64,
     pub seed: u64,
     pub confidence: f64,
@@ -163,6 +165,7 @@ impl<'a> Collector<'a> {
             missing_batches: merged.missing.iter().map(|r| [r.start, r.end]).collect(),
             stopped_by: StoppedBy::new(plan, merged),
             histories_per_batch: run.histories_per_batch,
+            thinning: run.thinning,
             histories,
             seed: run.seed,
             confidence: run.confidence,

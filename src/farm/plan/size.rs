@@ -50,7 +50,7 @@ impl Plan {
         let tally: u64 = sets.iter().map(|s| tally_bytes(s, of_shard)).fold(0, u64::saturating_add);
         let flux = kept_bytes(FLUX_BINS.len() as u64, of_shard).saturating_add(DIGEST * of_shard);
         let scores: u64 = sets.iter().map(|s| score_bytes(s, run.histories_per_batch)).fold(0, u64::saturating_add);
-        let vertices = run.histories_per_batch.saturating_mul(VERTICES * VERTEX);
+        let vertices = run.trajectories_per_batch().saturating_mul(VERTICES * VERTEX);
         let checkpoint = tally.saturating_add(flux);
         let worker = [PROCESS, self.scene.bytes, checkpoint, scores, vertices].into_iter().fold(0, u64::saturating_add);
         let checkpoints = checkpoint.saturating_mul(self.shard_count());

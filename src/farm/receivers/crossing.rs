@@ -31,7 +31,7 @@ impl ReceiverSet {
     }
 
     /// The scores of this set, the cells of `grid`, from the segments of every history of a batch.
-    pub fn counted<'a>(&self, scene: &Scene, grid: &Grid, batch: impl Iterator<Item = &'a Vec<Segment>>) -> Scores {
+    pub fn counted<'a>(&self, scene: &Scene, grid: &Grid, batch: impl Iterator<Item = &'a [Segment]>) -> Scores {
         let cells = cells(scene, grid);
         let mut scores = Scores::zero(&self.shape);
         let mut sums = vec![[Colour::BLACK; 2]; self.shape.bins()];
