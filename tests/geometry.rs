@@ -73,6 +73,9 @@ fn closest_hits_are_those_of_brute_force() {
             (Some(((_, margin), _)), None) => assert!(margin < 1e-9, "missed a triangle: {margin}"),
             (None, Some(hit)) => panic!("{hit:?} is not there"),
         }
+        let limit = 3.0 * rng.uniform();
+        let within = geometry.closest_hit_within(&Ray { origin, direction }, limit);
+        assert_eq!(within, hit.filter(|h| h.distance <= limit), "within {limit} m");
     }
     assert!(met > 1000, "only {met} rays met anything");
 }

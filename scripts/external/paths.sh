@@ -21,6 +21,12 @@ render() {
     "$@" merge "$to" >/dev/null
 }
 
+# Fails unless the summary in a folder says that the kernels ran with these instructions.
+ran_with() {
+    python3 -c 'import json, sys; print(*json.load(open(sys.argv[1]))["instructions"])' "$1/summary.json" | grep -qx "$2" ||
+        { echo "$1/summary.json does not say $2" >&2; exit 1; }
+}
+
 # All that must be the same, a line each.
 bits() {
     python3 -c 'import json, sys; print(json.load(open(sys.argv[1]))["results_digest"])' "$1/summary.json"
@@ -35,6 +41,7 @@ fi
 grep -q 'what this processor has: scalar$' "$folder/said"
 
 render "$folder/old" "${old[@]}"
+ran_with "$folder/old" scalar
 bits "$folder/old" >"$folder/expected"
 for path in avx512 avx2 scalar; do
     if ! LAMPYRIS_SIMD=$path "$program" plan "$job" -o "$folder/$path" >/dev/null 2>"$folder/said"; then
@@ -43,6 +50,7 @@ for path in avx512 avx2 scalar; do
         continue
     fi
     LAMPYRIS_SIMD=$path render "$folder/$path" "$program"
+    ran_with "$folder/$path" "$path"
     bits "$folder/$path" | diff "$folder/expected" - || { echo "$path and a processor of 2008 differ" >&2; exit 1; }
     echo "$path: the bits of a processor of 2008"
 done

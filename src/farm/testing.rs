@@ -4,6 +4,7 @@ use super::checkpoint::{Snapshot, write};
 use super::folder::Folder;
 use super::plan::{Input, Plan, SceneSummary};
 use crate::error::Result;
+use crate::geometry::simd::Path as Instructions;
 use crate::job::Job;
 use crate::random::{Domain, Stream};
 use crate::tally::{BatchScores, Scores, Tally};
@@ -116,6 +117,7 @@ pub fn save_tally(folder: &Folder, plan: &Plan, shard: u64, tally: &Tally, fixed
         seconds: 1.5,
         written: 1_700_000_000,
         host: "test",
+        instructions: Instructions::Scalar,
         relative_error: 0.25,
     };
     write(&path, &snapshot)

@@ -10,6 +10,7 @@ use super::inputs;
 use super::plan::Plan;
 use super::realization::Realization;
 use crate::error::{Error, Result};
+use crate::geometry::simd::Path as Instructions;
 use crate::tally::statistics::{Estimate, median};
 use crate::tally::{SetTally, Tally};
 use nix::sys::prctl;
@@ -173,6 +174,7 @@ impl<'a> Work<'a> {
             seconds: self.seconds + elapsed.as_secs_f64(),
             written: SystemTime::UNIX_EPOCH.elapsed().map_or(0, |d| d.as_secs()),
             host: &host_name(),
+            instructions: Instructions::chosen()?,
             relative_error: relative_error(&self.tally, fixed_direct),
         };
         checkpoint::write(Path::new(&self.path), &snapshot)?;

@@ -141,20 +141,21 @@ impl Mesh {
         p.cmpge(self.near.0).all() && p.cmple(self.near.1).all()
     }
 
+    /// The first triangle at most `limit` away.
     #[inline]
-    pub(super) fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+    pub(super) fn closest_hit(&self, ray: &Ray, limit: f64) -> Option<Hit> {
         if self.is_near(ray.origin) {
-            self.path.for_eights().run(Closest { mesh: self, ray })
+            self.path.for_eights().run(Closest { mesh: self, ray, limit })
         } else {
-            self.closest_hit_from_far(ray)
+            self.closest_hit_from_far(ray, limit)
         }
     }
 
     #[cold]
-    fn closest_hit_from_far(&self, ray: &Ray) -> Option<Hit> {
-        let (enter, _) = self.clip(ray.origin, ray.direction, f64::INFINITY)?;
+    fn closest_hit_from_far(&self, ray: &Ray, limit: f64) -> Option<Hit> {
+        let (enter, _) = self.clip(ray.origin, ray.direction, limit)?;
         let near = Ray { origin: ray.origin + enter * ray.direction, ..*ray };
-        let hit = self.path.for_eights().run(Closest { mesh: self, ray: &near })?;
+        let hit = self.path.for_eights().run(Closest { mesh: self, ray: &near, limit: limit - enter })?;
         Some(Hit { distance: hit.distance + enter, ..hit })
     }
 

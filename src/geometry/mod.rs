@@ -114,10 +114,16 @@ impl Geometry {
 
     /// The first surface along `ray`; equal distances go to the lower primitive number.
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+        self.closest_hit_within(ray, f64::INFINITY)
+    }
+
+    /// The same where it is at most `limit` away \[m\], else `None`: the shorter, the faster.
+    pub fn closest_hit_within(&self, ray: &Ray, limit: f64) -> Option<Hit> {
+        let hit = self.mesh.closest_hit(ray, limit);
         if self.spheres.is_empty() && self.planes.is_empty() {
-            return self.mesh.closest_hit(ray);
+            return hit;
         }
-        self.closest_of_all(ray, self.mesh.closest_hit(ray))
+        self.closest_of_all(ray, hit).filter(|hit| hit.distance <= limit)
     }
 
     /// What [`Geometry::closest_hit`] gives for each of `rays`, to `hits`, of the same length. Rays from one point go

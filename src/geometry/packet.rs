@@ -58,7 +58,9 @@ impl Kernel for Packets<'_> {
             for ((rays, hits), lanes) in rays.chunks(RAYS).zip(hits.chunks_mut(RAYS)).zip(&lanes) {
                 match lanes.directions::<I>() {
                     Some(directions) => Search::<I>::new(self.mesh, rays, &directions, &mut work).run(rays, hits),
-                    None => rays.iter().zip(hits).for_each(|(ray, hit)| *hit = self.mesh.closest_hit(ray)),
+                    None => {
+                        rays.iter().zip(hits).for_each(|(ray, hit)| *hit = self.mesh.closest_hit(ray, f64::INFINITY))
+                    }
                 }
             }
         }

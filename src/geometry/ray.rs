@@ -147,6 +147,8 @@ fn one_by_one(ray: &Ray) -> Ray {
 pub(super) struct Closest<'a> {
     pub(super) mesh: &'a Mesh,
     pub(super) ray: &'a Ray,
+    /// How far it goes \[m\].
+    pub(super) limit: f64,
 }
 
 impl Kernel for Closest<'_> {
@@ -154,13 +156,13 @@ impl Kernel for Closest<'_> {
 
     #[inline(always)]
     fn run<I: Isa>(self) -> Option<Hit> {
-        let Closest { mesh, ray } = self;
+        let Closest { mesh, ray, limit } = self;
         let ray = one_by_one(ray);
         // Boxes and triangles must see the same ray, or it could pass between a box and its triangle.
         let (origin, direction) = (ray.origin.as_vec3(), ray.direction.as_vec3());
         let (o, d) = (origin.as_dvec3(), direction.as_dvec3());
         let (boxes, sight) = (BoxRay::<I>::new(origin, direction), Sight::<I>::new(origin, direction, 1.0));
-        let mut best = Best { distance: f64::MAX, end: f32::INFINITY, found: None };
+        let mut best = Best { distance: limit.min(f64::MAX), end: (limit * (1.0 + 1e-6)) as f32, found: None };
         let mut open = Open::default();
         let mut next = if mesh.is_empty() { None } else { Some(0) };
         loop {

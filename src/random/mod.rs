@@ -115,9 +115,11 @@ pub struct Generator {
 }
 
 impl Generator {
-    /// The same generator with the coordinates of `point` in front.
-    pub fn after(self, point: [f64; DIMENSIONS]) -> Self {
-        Generator { point, taken: 0, ..self }
+    /// The same generator with the coordinates of `point`, at most [`DIMENSIONS`], in front.
+    pub fn after<const N: usize>(self, point: [f64; N]) -> Self {
+        let mut generator = Generator { taken: DIMENSIONS - N, ..self };
+        generator.point[DIMENSIONS - N..].copy_from_slice(&point);
+        generator
     }
 
     /// Uniform in [0, 1), a multiple of 2^-53.

@@ -104,6 +104,11 @@ impl PointSet {
 
     /// Point number `i` of the set: eight multiples of 2^-53 in [0, 1).
     pub fn point(&self, i: u32) -> [f64; DIMENSIONS] {
+        self.start(i)
+    }
+
+    /// The first coordinates of point number `i`.
+    pub fn start<const N: usize>(&self, i: u32) -> [f64; N] {
         let x = sobol(i);
         std::array::from_fn(|d| self.scrambled(x[d], self.keys[d]) as f64 * UNIT)
     }

@@ -108,7 +108,13 @@ fn step(scene: &Scene, at: &Receiver, bound: f64, rng: &mut Generator) -> Option
         return None;
     }
     let origin = scene.geometry.lift(at.position, at.normal);
-    let hit = scene.geometry.closest_hit(&Ray { origin, direction }).filter(|h| !scene.absorbs(h))?;
+    let reach = if scene.has_peaks() || at.response.is_peaked() {
+        f64::INFINITY
+    } else {
+        // From farther away no factor exceeds b, and the path would end there.
+        1.0 / bound.sqrt() * (1.0 + 1e-6) + 2.0 * origin.distance(at.position)
+    };
+    let hit = scene.geometry.closest_hit_within(&Ray { origin, direction }, reach).filter(|h| !scene.absorbs(h))?;
     let reflectance = &scene.surface(hit.primitive).reflectance;
     if reflectance.is_black() {
         return None;

@@ -1,8 +1,9 @@
 //! Any x86-64 CPU: the C library chooses its functions by CPU, and masks choose others.
 
-use crate::bits::Bits;
+use crate::bits::{Bits, summary};
 use crate::place::{Place, straight};
 use crate::process::{expect, lampyris, run_quietly};
+use lampyris::geometry::simd::{self, Path};
 use std::process::Command;
 
 /// Names of glibc 2.36 (sysdeps/x86/cpu-tunables.c). An unknown one would be ignored silently, so it is checked that
@@ -33,6 +34,17 @@ fn masked_cpus_give_the_same_bits() {
         Bits::of(&dir).assert_same(&straight().bits);
         masked(lampyris(&["merge"]).arg(&dir), mask);
         Bits::of(&dir).assert_same(&straight().bits);
+    }
+}
+
+#[test]
+fn every_path_of_the_kernels_gives_the_same_bits_and_is_named() {
+    let place = Place::new();
+    for path in Path::ALL.into_iter().filter(|path| path.is_available()) {
+        let dir = place.path(path.name());
+        expect(0, run_quietly(&place.path("job.toml"), &dir, 2).env(simd::VARIABLE, path.name()));
+        Bits::of(&dir).assert_same(&straight().bits);
+        assert_eq!(summary(&dir)["instructions"], serde_json::json!([path.name()]));
     }
 }
 

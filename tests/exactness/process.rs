@@ -15,7 +15,11 @@ const PATIENCE: Duration = Duration::from_secs(60);
 pub fn lampyris(args: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_lampyris"));
     command.args(args).stdin(Stdio::null());
-    command.env_remove("SLURM_ARRAY_TASK_ID").env_remove("LAMPYRIS_FAULT").env_remove("GLIBC_TUNABLES");
+    command
+        .env_remove("SLURM_ARRAY_TASK_ID")
+        .env_remove("LAMPYRIS_FAULT")
+        .env_remove("GLIBC_TUNABLES")
+        .env_remove("LAMPYRIS_SIMD");
     command
 }
 

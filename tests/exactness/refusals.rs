@@ -3,6 +3,7 @@
 use crate::place::{Place, Tree, batches_of, checkpoint, computed, header, plan_in, straight};
 use crate::process::{expect, lampyris, run_quietly, work};
 use lampyris::farm::checkpoint::{Reader, Snapshot, write};
+use lampyris::geometry::simd::Path as Instructions;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -122,6 +123,7 @@ fn write_diverging(from: &Path, to: &Path, batch: usize) {
         seconds: 1.0,
         written: 0,
         host: "elsewhere",
+        instructions: Instructions::Scalar,
         relative_error: 0.1,
     };
     fs::create_dir_all(to.join("shards")).unwrap();

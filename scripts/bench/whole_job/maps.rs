@@ -3,6 +3,7 @@
 
 use lampyris::farm::checkpoint::Snapshot;
 use lampyris::farm::plan::{Input, Plan, SceneSummary};
+use lampyris::geometry::simd::Path as Instructions;
 use lampyris::job::Job;
 use lampyris::random::{Domain, Stream};
 use lampyris::tally::{BatchScores, Scores, Tally};
@@ -57,5 +58,16 @@ pub fn tally(plan: &Plan, shard: u64) -> Tally {
 /// What is written of `tally` as `shard`.
 pub fn snapshot<'a>(plan: &'a Plan, shard: u64, tally: &'a Tally) -> Snapshot<'a> {
     let (seconds, written, relative_error) = (60.0, 0, 0.1);
-    Snapshot { plan, shard, tally, fixed_direct: &NO_FIXED_DIRECT, seconds, written, host: "bench", relative_error }
+    let instructions = Instructions::Scalar;
+    Snapshot {
+        plan,
+        shard,
+        tally,
+        fixed_direct: &NO_FIXED_DIRECT,
+        seconds,
+        written,
+        host: "bench",
+        instructions,
+        relative_error,
+    }
 }

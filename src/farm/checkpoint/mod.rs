@@ -18,6 +18,7 @@ mod write;
 pub use read::{Reader, read_header};
 pub use write::{Snapshot, write};
 
+use crate::geometry::simd::Path as Instructions;
 use crate::job::{Kept, SetShape};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -51,6 +52,8 @@ pub struct Header {
     pub written: u64,
     /// Machine that wrote it.
     pub host: String,
+    /// Instructions with which its kernels ran; no number depends on them.
+    pub instructions: Instructions,
     /// Median relative error so far, an estimate from this shard alone; NaN when nothing is known.
     pub relative_error: f64,
     /// What follows the header, in the order of the file.

@@ -5,6 +5,7 @@ use super::{Checksum, Content, Header, MAGIC, Section, VERSION, block_range, che
 use crate::error::{Error, Result};
 use crate::farm::durable;
 use crate::farm::plan::Plan;
+use crate::geometry::simd::Path as Instructions;
 use crate::job::SetShape;
 use crate::tally::{SetTally, Tally};
 use std::io::{self, Write};
@@ -27,6 +28,8 @@ pub struct Snapshot<'a> {
     pub written: u64,
     /// This machine.
     pub host: &'a str,
+    /// Instructions with which the kernels ran.
+    pub instructions: Instructions,
     /// Median relative error so far.
     pub relative_error: f64,
 }
@@ -52,6 +55,7 @@ fn header_bytes(snapshot: &Snapshot, sections: Vec<Section>) -> Vec<u8> {
         seconds: snapshot.seconds,
         written: snapshot.written,
         host: snapshot.host.to_owned(),
+        instructions: snapshot.instructions,
         relative_error: snapshot.relative_error,
         sections,
     };

@@ -19,6 +19,7 @@ use super::checkpoint::{BLOCK, Checksum, Reader, block_count};
 use super::folder::Folder;
 use super::plan::Plan;
 use crate::error::{Error, Result};
+use crate::geometry::simd::Path as Instructions;
 use crate::job::{Kept, SetShape};
 use crate::tally::statistics::Estimate;
 use crate::tally::{FLUX_BINS, MomentBlock, Monitor, Replicates};
@@ -72,6 +73,8 @@ pub struct Merged {
     pub looks: Vec<Look>,
     /// Time spent by all workers on the batches merged \[s\].
     pub seconds: f64,
+    /// Instructions with which the kernels of the workers ran, each once.
+    pub instructions: Vec<Instructions>,
 }
 
 /// Merges the checkpoints in `folders`, all of one plan; with them the plan, the longest when some were extended.
@@ -135,6 +138,7 @@ struct Fold<'a> {
     fixed: Option<(PathBuf, Vec<Checksum>, Vec<Vec<f64>>)>,
     batches: u64,
     seconds: f64,
+    instructions: Vec<Instructions>,
     done: Vec<Range<u64>>,
     goal: Option<Goal>,
     looks: Vec<Look>,
@@ -166,9 +170,10 @@ impl<'a> Fold<'a> {
         let sets = shapes.iter().map(empty).collect();
         let monitors = shapes.iter().map(Monitor::of_set).collect();
         let flux = Replicates::new(FLUX_BINS.len());
-        let (done, looks) = (Vec::new(), Vec::new());
+        let (done, looks, instructions) = (Vec::new(), Vec::new(), Vec::new());
+        let (batches, seconds, fixed) = (0, 0.0, None);
         let goal = Goal::of(plan);
-        Fold { plan, shapes, read, sets, monitors, flux, fixed: None, batches: 0, seconds: 0.0, done, goal, looks }
+        Fold { plan, shapes, read, sets, monitors, flux, fixed, batches, seconds, instructions, done, goal, looks }
     }
 
     /// Folds in the next shard.
@@ -196,6 +201,9 @@ impl<'a> Fold<'a> {
         self.done.push(start..start + n);
         self.batches += n;
         self.seconds += reader.header().seconds;
+        if !self.instructions.contains(&reader.header().instructions) {
+            self.instructions.push(reader.header().instructions);
+        }
         Ok(())
     }
 
@@ -260,8 +268,8 @@ impl<'a> Fold<'a> {
             SetFold::Replicates(scores) => SetResult::Replicates { scores, fixed_direct },
         });
         let (sets, looks, monitors) = (sets.collect(), self.looks, self.monitors);
-        let Fold { flux, batches, seconds, .. } = self;
-        Merged { sets, monitors, flux, batches, missing, stopped, looks, seconds }
+        let Fold { flux, batches, seconds, instructions, .. } = self;
+        Merged { sets, monitors, flux, batches, missing, stopped, looks, seconds, instructions }
     }
 }
 

@@ -66,11 +66,14 @@ pub struct Paths {
     next: u32,
 }
 
+/// Quasi-random coordinates of a path: two directions at matt surfaces.
+const COORDINATES: usize = 4;
+
 impl Paths {
     /// The numbers of the next path.
     pub fn next(&mut self) -> &mut Generator {
         if let Some(points) = &self.points {
-            self.rng = self.rng.clone().after(points.point(self.next));
+            self.rng = self.rng.clone().after(points.start::<COORDINATES>(self.next));
             self.next += 1;
         }
         &mut self.rng
