@@ -185,7 +185,7 @@ fn a_peaked_floor_under_a_lamp_is_as_reverse_paths_find_it() {
 #[test]
 fn the_image_of_a_lamp_in_a_narrow_lobe_is_told() {
     let caustic = |roughness: f64, luminance: f64, source: &str| {
-        let job = run(64, 16) + source + &peaked_receivers();
+        let job = run(256, 16) + source + &peaked_receivers();
         let case = Case::new(&job, cube_with_peaked_floor(roughness, luminance));
         let batches = case.batches(ALL).1;
         let mean = |set: usize| Estimate::from_scores(batches.iter().map(|b| b.sets[set].caustic[0])).mean;

@@ -21,7 +21,7 @@ const LAYERS: [&[&str]; 9] = [
 /// Inside `farm`, lowest first; modules of one row do not know each other.
 const FARM: [&[&str]; 9] = [
     &["plan", "durable"],
-    &["receivers"],
+    &["receivers", "thinning"],
     &["regions"],
     &["local"],
     &["folder", "realization", "pilot"],

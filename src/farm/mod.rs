@@ -10,6 +10,7 @@
 //! regions       parts of maps, one number a batch
 //! pilot         the bound of the kernel, fixed before the run
 //! local         histories of a batch x receivers of a set -> scores, in parallel
+//! thinning      vertices of many trajectories -> those that are connected
 //! realization   batch index -> scores, in parallel
 //! checkpoint    one durable file for each shard
 //! status        headers -> progress

@@ -1,8 +1,8 @@
 //! One realization of a job: the scores of one batch, with [`super::local`] the only parallel computation.
 //!
-//! A batch is computed from its index alone. Its histories are traced in parallel and collected in index order;
-//! then every tile of receivers sums all vertices in index order, so any number of threads gives the same bits.
-//! The other estimators keep to this: a bin follows its own paths, a grid counts the histories in index order.
+//! A batch is computed from its index alone. Its trajectories are traced in parallel and collected in index order, and thinned
+//! to histories; then every tile of receivers sums all vertices history by history, so any number of threads gives the same
+//! bits. The other estimators keep to this: a bin follows its own paths, a grid counts the histories in index order.
 //! Each receiver set keeps the order in which its bins share tiles, found once from the centres of its bins.
 
 use super::local;

@@ -4,7 +4,6 @@ use super::checkpoint::{Snapshot, write};
 use super::folder::Folder;
 use super::plan::{Input, Plan, SceneSummary};
 use crate::error::Result;
-use crate::geometry::simd::Path as Instructions;
 use crate::job::Job;
 use crate::random::{Domain, Stream};
 use crate::tally::{BatchScores, Scores, Tally};
@@ -117,7 +116,7 @@ pub fn save_tally(folder: &Folder, plan: &Plan, shard: u64, tally: &Tally, fixed
         seconds: 1.5,
         written: 1_700_000_000,
         host: "test",
-        instructions: Instructions::Scalar,
+        instructions: "scalar",
         relative_error: 0.25,
     };
     write(&path, &snapshot)

@@ -174,7 +174,7 @@ impl<'a> Work<'a> {
             seconds: self.seconds + elapsed.as_secs_f64(),
             written: SystemTime::UNIX_EPOCH.elapsed().map_or(0, |d| d.as_secs()),
             host: &host_name(),
-            instructions: Instructions::chosen()?,
+            instructions: Instructions::chosen()?.name(),
             relative_error: relative_error(&self.tally, fixed_direct),
         };
         checkpoint::write(Path::new(&self.path), &snapshot)?;

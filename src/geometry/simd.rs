@@ -15,7 +15,6 @@ mod wide;
 
 use crate::error::{Error, Result};
 use plain::Plain;
-use serde::{Deserialize, Serialize};
 use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
 use std::sync::OnceLock;
 use wide::{Pair, Ymm, Zmm};
@@ -24,8 +23,7 @@ use wide::{Pair, Ymm, Zmm};
 pub const VARIABLE: &str = "LAMPYRIS_SIMD";
 
 /// Instructions that kernels are compiled for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Path {
     /// 16 lanes in a register.
     Avx512,

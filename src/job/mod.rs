@@ -58,7 +58,7 @@ pub struct Job {
 }
 
 /// Default histories of a batch in a job with maps.
-const HISTORIES_OF_MAPS: u64 = 16;
+const HISTORIES_OF_MAPS: u64 = 64;
 /// The same in a job of lux-meters alone.
 const HISTORIES_OF_METERS: u64 = 1024;
 /// Bins to which a history is connected for each trajectory traced for it, by default: chosen by measured figure of merit
@@ -75,7 +75,7 @@ const TRAJECTORIES: u64 = 1 << 16;
 pub struct Run {
     /// Seed of every random number, 0 ..= 2^63-1.
     pub seed: u64,
-    /// Histories of one batch; a batch is one realization, the unit of the variance. Left out: 16 with cameras or
+    /// Histories of one batch; a batch is one realization, the unit of the variance. Left out: 64 with cameras or
     /// goniometers, whose pixels need many positions, and so many batches; else 1024, because a quasi-random set gains
     /// with its size (docs/benchmarks.md).
     pub histories_per_batch: u64,

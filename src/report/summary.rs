@@ -45,7 +45,7 @@ pub(super) struct Summary {
     pub flux_lm: Flux,
     pub timings: Timings,
     /// With which the kernels of the workers ran; no number depends on them.
-    pub instructions: Vec<&'static str>,
+    pub instructions: Vec<String>,
     /// Of the scene, and of these results.
     pub warnings: Vec<String>,
     /// BLAKE3 of all numbers of all bins and of the flux balance: equal for equal results, whatever the time taken.
@@ -181,7 +181,7 @@ impl<'a> Collector<'a> {
                 worker_seconds: merged.seconds,
                 histories_per_second: histories as f64 / merged.seconds,
             },
-            instructions: merged.instructions.iter().map(|i| i.name()).collect(),
+            instructions: merged.instructions.clone(),
             results_digest: self.hasher.finalize().to_hex().to_string(),
         }
     }

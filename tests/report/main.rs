@@ -139,7 +139,7 @@ fn merged(n: u64) -> Merged {
         stopped: None,
         looks: Vec::new(),
         seconds: 4.0,
-        instructions: vec![lampyris::geometry::simd::Path::Avx2],
+        instructions: vec!["avx2".into()],
     }
 }
 

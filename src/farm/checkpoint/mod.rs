@@ -18,7 +18,6 @@ mod write;
 pub use read::{Reader, read_header};
 pub use write::{Snapshot, write};
 
-use crate::geometry::simd::Path as Instructions;
 use crate::job::{Kept, SetShape};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -26,7 +25,7 @@ use std::ops::Range;
 /// First bytes of every checkpoint; the last two find transfers that translate line ends.
 pub const MAGIC: [u8; 8] = *b"LAMPYR\r\n";
 /// Version of the format that this program writes and reads.
-pub const VERSION: u32 = 2;
+pub const VERSION: u32 = 3;
 /// Bins of a map that are stored, checked and merged together.
 pub const BLOCK: usize = 4096;
 /// Magic, version and header length \[bytes\].
@@ -53,7 +52,7 @@ pub struct Header {
     /// Machine that wrote it.
     pub host: String,
     /// Instructions with which its kernels ran; no number depends on them.
-    pub instructions: Instructions,
+    pub instructions: String,
     /// Median relative error so far, an estimate from this shard alone; NaN when nothing is known.
     pub relative_error: f64,
     /// What follows the header, in the order of the file.

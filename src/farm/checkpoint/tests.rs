@@ -98,7 +98,7 @@ fn newer_versions_other_plans_and_other_shards_are_named() {
     assert!(refusal(read_header(&path, &other, 1)).starts_with("of another plan: digest "));
     let header = read_header(&path, &plan, 1).unwrap().unwrap();
     fs::write(&path, frame(&header, VERSION + 1)).unwrap();
-    assert_eq!(refusal(read_header(&path, &plan, 1)), "format version 3 is newer; this program reads version 2");
+    assert_eq!(refusal(read_header(&path, &plan, 1)), "format version 4 is newer; this program reads version 3");
     fs::write(&path, "a letter to my aunt, long enough").unwrap();
     assert_eq!(refusal(read_header(&path, &plan, 1)), "not a checkpoint of lampyris");
 }
@@ -262,8 +262,8 @@ fn golden_tally(plan: &Plan) -> Tally {
 }
 
 #[test]
-fn the_golden_file_of_version_2_is_read_and_written_bit_for_bit() {
-    let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/shard-v2.ckpt");
+fn the_golden_file_of_version_3_is_read_and_written_bit_for_bit() {
+    let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/shard-v3.ckpt");
     // The numbers of the program may change without changing the format.
     let plan = Plan { numerics: 1, ..small() };
     let (_temp, folder) = folder();
@@ -272,7 +272,7 @@ fn the_golden_file_of_version_2_is_read_and_written_bit_for_bit() {
     let written = fs::read(folder.shard_path(1)).unwrap();
     let stored = fs::read(&golden).unwrap_or_default();
     if written != stored {
-        let new = std::env::temp_dir().join("shard-v2.ckpt");
+        let new = std::env::temp_dir().join("shard-v3.ckpt");
         fs::write(&new, &written).unwrap();
         panic!("the bytes have changed: raise VERSION if that is meant; the new file is {}", new.display());
     }

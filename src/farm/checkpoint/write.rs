@@ -5,7 +5,6 @@ use super::{Checksum, Content, Header, MAGIC, Section, VERSION, block_range, che
 use crate::error::{Error, Result};
 use crate::farm::durable;
 use crate::farm::plan::Plan;
-use crate::geometry::simd::Path as Instructions;
 use crate::job::SetShape;
 use crate::tally::{SetTally, Tally};
 use std::io::{self, Write};
@@ -29,7 +28,7 @@ pub struct Snapshot<'a> {
     /// This machine.
     pub host: &'a str,
     /// Instructions with which the kernels ran.
-    pub instructions: Instructions,
+    pub instructions: &'a str,
     /// Median relative error so far.
     pub relative_error: f64,
 }
@@ -55,7 +54,7 @@ fn header_bytes(snapshot: &Snapshot, sections: Vec<Section>) -> Vec<u8> {
         seconds: snapshot.seconds,
         written: snapshot.written,
         host: snapshot.host.to_owned(),
-        instructions: snapshot.instructions,
+        instructions: snapshot.instructions.to_owned(),
         relative_error: snapshot.relative_error,
         sections,
     };

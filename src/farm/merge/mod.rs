@@ -19,7 +19,6 @@ use super::checkpoint::{BLOCK, Checksum, Reader, block_count};
 use super::folder::Folder;
 use super::plan::Plan;
 use crate::error::{Error, Result};
-use crate::geometry::simd::Path as Instructions;
 use crate::job::{Kept, SetShape};
 use crate::tally::statistics::Estimate;
 use crate::tally::{FLUX_BINS, MomentBlock, Monitor, Replicates};
@@ -74,7 +73,7 @@ pub struct Merged {
     /// Time spent by all workers on the batches merged \[s\].
     pub seconds: f64,
     /// Instructions with which the kernels of the workers ran, each once.
-    pub instructions: Vec<Instructions>,
+    pub instructions: Vec<String>,
 }
 
 /// Merges the checkpoints in `folders`, all of one plan; with them the plan, the longest when some were extended.
@@ -138,7 +137,7 @@ struct Fold<'a> {
     fixed: Option<(PathBuf, Vec<Checksum>, Vec<Vec<f64>>)>,
     batches: u64,
     seconds: f64,
-    instructions: Vec<Instructions>,
+    instructions: Vec<String>,
     done: Vec<Range<u64>>,
     goal: Option<Goal>,
     looks: Vec<Look>,
@@ -202,7 +201,7 @@ impl<'a> Fold<'a> {
         self.batches += n;
         self.seconds += reader.header().seconds;
         if !self.instructions.contains(&reader.header().instructions) {
-            self.instructions.push(reader.header().instructions);
+            self.instructions.push(reader.header().instructions.clone());
         }
         Ok(())
     }

@@ -35,7 +35,7 @@ fn everything_else_is_inside_and_named() {
         ("seed = 7", "seed = 8", "run.seed: 7 in the plan, 8 now"),
         ("channels = \"rgb\"", "", "run.channels: \"rgb\" in the plan, \"luminance\" now"),
         ("batches_per_shard = 4", "batches_per_shard = 5", "run.batches_per_shard: 4"),
-        ("seed = 7", "seed = 7\nhistories_per_batch = 1", "run.histories_per_batch: 16 in the plan, 1 now"),
+        ("seed = 7", "seed = 7\nhistories_per_batch = 1", "run.histories_per_batch: 64 in the plan, 1 now"),
         ("[[camera]]", "[transport]\nroulette_below = \"analog\"\n[[camera]]", "transport.roulette_below: 0.05"),
         ("width = 5", "width = 6", "camera[0].width: 5 in the plan, 6 now"),
         ("width = 5", "width = 5\nup = [1, 0, 0]", "camera[0].up: (none) in the plan, [1.0,0.0,0.0] now"),
