@@ -12,8 +12,8 @@ use std::process::Command;
 /// NUMERICS, digest of the plan, digest of the results of `tests/exactness/job.toml`.
 const GOLDEN: (u32, &str, &str) = (
     4,
-    "bc06449e4d900758c5a36220d68e56b1a069f860b89e70c6de77097aedc4f8e4",
-    "dfad26a6a5e53bf5413cab4d12307f17a741359e4d456bfd0b9bdaeaed2b2cf3",
+    "466fed6f493689e6bff8d32269d9e2eb7c0779caa36a9162724ecf8823659e9a",
+    "950182b49fb7e1be7ecf224a7777eb391727fe4777ee228f7a82b3afeb983a35",
 );
 
 #[test]

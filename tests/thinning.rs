@@ -30,7 +30,7 @@ fn indirect(job: &str, model: Model, orders: Range<u32>) -> Vec<Estimate> {
 fn every_order_of_a_furnace_is_a_power_of_the_reflectance() {
     let furnace = || closed_box(DVec3::ONE, &lambert(0.5, 1.0 / PI));
     let order = |n: u32| -> Vec<Comparison> {
-        let found = indirect(&(run(2048, 8, 71) + &meters()), furnace(), n..n + 1);
+        let found = indirect(&(run(4096, 8, 71) + &meters()), furnace(), n..n + 1);
         let name = |i| format!("order {n}, meter {i}");
         found.iter().enumerate().map(|(i, e)| compare(name(i), *e, 1.0 / f64::from(1 << n))).collect()
     };
