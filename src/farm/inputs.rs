@@ -7,6 +7,7 @@ use super::plan::{Input, Plan, SceneSummary};
 use super::receivers::ReceiverSet;
 use super::regions::Regions;
 use crate::error::{Error, Result};
+use crate::geometry::Build;
 use crate::job::Job;
 use crate::scene::{Model, Scene, gltf};
 use std::fs;
@@ -35,7 +36,8 @@ pub fn prepare(path: &Path) -> Result<Prepared> {
         Some(name) => read_model(path, name, &mut files)?,
         None => Model::default(),
     };
-    let scene = Scene::new(model, &job)?;
+    // Planning asks few rays, and each worker builds the scene again.
+    let scene = Scene::built(model, &job, Build::Quick)?;
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let job_file = Input::of(&file_name(path), text.as_bytes());
     let inputs = files.iter().map(|(input, _): &(Input, Vec<u8>)| input.clone()).collect();

@@ -19,6 +19,15 @@ pub(super) const WIDTH: usize = 8;
 /// Triangles up to which the hierarchy is built with most care.
 const FEW: usize = 1 << 17;
 
+/// How much time is spent to make a hierarchy good. No hit depends on it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Build {
+    /// Little: for a few thousand rays.
+    Quick,
+    /// What pays in a job.
+    Thorough,
+}
+
 /// Eight boxes, each around a node or a block.
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
@@ -52,7 +61,7 @@ pub(super) struct Bvh8 {
 
 impl Bvh8 {
     /// The hierarchy over `triangles`, their boxes inflated by `margin` \[m\].
-    pub(super) fn new(triangles: &[[Vec3; 3]], margin: f32) -> Self {
+    pub(super) fn new(triangles: &[[Vec3; 3]], margin: f32, build: Build) -> Self {
         if triangles.is_empty() {
             return Bvh8 { firsts: vec![0], ..Bvh8::default() };
         }
@@ -62,7 +71,7 @@ impl Bvh8 {
             Aabb::new(tight.min - margin, tight.max + margin)
         };
         let boxes: Vec<Aabb> = triangles.iter().map(inflated).collect();
-        let bvh = Collapse::of(&build_bvh2(&boxes, care(triangles.len()), &mut Default::default()));
+        let bvh = Collapse::of(&build_bvh2(&boxes, care(triangles.len(), build), &mut Default::default()));
         Bvh8 { nodes: pages::collect(bvh.nodes.len(), bvh.nodes.into_iter()), ..bvh }
     }
 
@@ -101,11 +110,15 @@ impl Bvh8 {
 
 /// How a hierarchy of `count` triangles is built. Most care gains 25 % of the kernel's speed in a room of 34 triangles; among a
 /// million it takes 1 s more and gains nothing over a wider search for neighbours, which gains 7 %.
-fn care(count: usize) -> BvhBuildParams {
+fn care(count: usize, build: Build) -> BvhBuildParams {
     let medium = BvhBuildParams::medium_build();
     let (ploc_search_distance, search_depth_threshold) = (PlocSearchDistance::High, 2);
     let wide = BvhBuildParams { ploc_search_distance, search_depth_threshold, ..medium };
-    let preset = if count <= FEW { BvhBuildParams::slow_build() } else { wide };
+    let preset = match build {
+        Build::Quick => BvhBuildParams::fastest_build(),
+        Build::Thorough if count <= FEW => BvhBuildParams::slow_build(),
+        Build::Thorough => wide,
+    };
     BvhBuildParams { max_prims_per_leaf: WIDTH as u32, pre_split: false, ..preset }
 }
 

@@ -5,7 +5,7 @@
 //! edge changes exactly their sign, so the two neighbours of an edge agree about the side on which a ray passes; a ray on the
 //! edge meets both. Everything before that, in f32 and for many triangles at once, is conservative.
 
-use super::bvh::{Bvh8, Node, WIDTH};
+use super::bvh::{Build, Bvh8, Node, WIDTH};
 use super::pages;
 use super::planes::Block;
 use super::ray::{Any, Closest};
@@ -65,6 +65,11 @@ impl Default for Mesh {
 impl Mesh {
     /// Builds the hierarchy over `triangles` \[m\], counter-clockwise seen from the front.
     pub fn new(triangles: &[[Vec3; 3]]) -> Self {
+        Mesh::built(triangles, Build::Thorough)
+    }
+
+    /// The same with more or less care.
+    pub fn built(triangles: &[[Vec3; 3]], build: Build) -> Self {
         let empty = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         let bounds = triangles.iter().flatten().fold(empty, |(low, high), p| {
             let p = p.as_dvec3();
@@ -73,7 +78,7 @@ impl Mesh {
         let diagonal = (bounds.1 - bounds.0).length();
         let size = bounds.0.abs().max(bounds.1.abs()).max_element() + diagonal;
         // Twice the scene is the longest way of a ray inside it; 8 roundings of that are more than a test of a box makes.
-        let bvh = Bvh8::new(triangles, (8.0 / f64::from(1 << 24) * 2.0 * size) as f32);
+        let bvh = Bvh8::new(triangles, (8.0 / f64::from(1 << 24) * 2.0 * size) as f32, build);
         let mut place = vec![0; triangles.len()];
         for (at, &primitive) in bvh.order.iter().enumerate() {
             place[primitive as usize] = at as u32;

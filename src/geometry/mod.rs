@@ -26,6 +26,7 @@ pub mod simd;
 mod sphere;
 pub mod visibility;
 
+pub use bvh::Build;
 pub use mesh::Mesh;
 pub use ordering::kd_order;
 pub use plane::Plane;

@@ -14,7 +14,7 @@ pub use reflectance::{Reflectance, Scattered, weight_over_tolerated};
 pub use source::{Emission, Emitter, Light, Sources};
 
 use crate::error::{Error, Result};
-use crate::geometry::{Geometry, Hit, Mesh, Plane, Sphere};
+use crate::geometry::{Build, Geometry, Hit, Mesh, Plane, Sphere};
 use crate::job::{self, Channels, Job};
 use crate::math::DVec3;
 use crate::photometry::Colour;
@@ -100,13 +100,21 @@ impl Scene {
     /// # Errors
     /// [`Error::Input`] for a scene without light, or parallel light over infinite planes.
     pub fn new(model: Model, job: &Job) -> Result<Scene> {
+        Scene::built(model, job, Build::Thorough)
+    }
+
+    /// The same with more or less care for the speed of what follows.
+    ///
+    /// # Errors
+    /// As [`Scene::new`].
+    pub fn built(model: Model, job: &Job, build: Build) -> Result<Scene> {
         let offset = -middle(&model.positions, &job.spheres);
         let paint = |c: Colour| match job.run.channels {
             Channels::Luminance => Colour::grey(c.luminance()),
             Channels::Rgb => c,
         };
         let corners = model.triangles.iter().map(|t| t.map(|v| (model.positions[v as usize] + offset).as_vec3()));
-        let mesh = Mesh::new(&corners.collect::<Vec<_>>());
+        let mesh = Mesh::built(&corners.collect::<Vec<_>>(), build);
         let mut surfaces: Vec<Surface> = model.surfaces.into_iter().map(|s| painted(s, job.run.channels)).collect();
         let mut surface_of = model.surface_of;
         let geometry = Geometry::new(mesh, spheres(job, offset), planes(job, offset));
