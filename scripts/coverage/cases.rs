@@ -4,7 +4,7 @@
 //! times smaller than that of one run.
 
 use super::count::{Counted, Quantity, count};
-use super::edge::cube;
+use super::edge::{cube, sampled};
 use super::replicate::{Kind, Replicate};
 use lampyris::error::{Error, Result};
 use lampyris::math::{DVec3, PI, cos, sin};
@@ -26,12 +26,13 @@ const SOBOLEV_A_1: f64 = 0.653442317194389;
 /// All cases, printed as they come.
 pub fn run(replicates: u64, mut done: impl FnMut(&[Counted])) -> Result<Vec<Counted>> {
     type Case = fn(u64) -> Result<Vec<Counted>>;
-    let cases: [Case; 19] = [
+    let cases: [Case; 20] = [
         |n| sobolev_a("rqmc", n),
         |n| sobolev_a("random", n),
         ulbricht_sphere,
         |n| lamp_in_cube("rqmc", 32, 32, true, n),
         |n| lamp_in_cube("random", 32, 32, false, n),
+        |n| lamp_in_cube("thinned", 32, 32, true, n),
         |n| lamp_in_cube("rqmc", 16, 32, false, n),
         |n| lamp_in_cube("random", 64, 32, false, n),
         furnace_grid,
@@ -57,7 +58,8 @@ pub fn run(replicates: u64, mut done: impl FnMut(&[Counted])) -> Result<Vec<Coun
 }
 
 fn tables(sampling: &str, batches: u32, histories: u32) -> String {
-    format!("[run]\nhistories_per_batch = {histories}\nbatches = {batches}\nsampling = \"{sampling}\"\n")
+    let sampling = sampled(sampling);
+    format!("[run]\nhistories_per_batch = {histories}\nbatches = {batches}\n{sampling}")
 }
 
 fn exact(name: &str, kind: Kind, truth: f64) -> Quantity {

@@ -25,9 +25,16 @@ pub fn cube(run: &str, distances: &[f64]) -> Result<Experiment> {
 
 /// The tables `[run]` and `[transport]` of 32 batches of 64 histories.
 pub fn tables(sampling: &str, bounded: bool) -> String {
-    format!(
-        "[run]\nhistories_per_batch = 64\nbatches = 32\nsampling = \"{sampling}\"\n[transport]\nbounded = {bounded}\n"
-    )
+    let sampling = sampled(sampling);
+    format!("[run]\nhistories_per_batch = 64\nbatches = 32\n{sampling}[transport]\nbounded = {bounded}\n")
+}
+
+/// The lines of `[run]` for rqmc or random histories, or for "thinned": quasi-random ones of eight trajectories each.
+pub fn sampled(sampling: &str) -> String {
+    match sampling {
+        "thinned" => "sampling = \"rqmc\"\nthinning = 8\n".to_owned(),
+        _ => format!("sampling = \"{sampling}\"\n"),
+    }
 }
 
 /// The experiment: every receiver, indirect and total.

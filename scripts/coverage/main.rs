@@ -6,7 +6,7 @@
 //! cargo run --release --example coverage -- convergence SAMPLING SEEDS           no floor beside a column
 //! ```
 //!
-//! SAMPLING is rqmc or random, KERNEL bounded or plain. Tables go to the terminal as Markdown; docs/coverage.md holds a
+//! SAMPLING is rqmc, random or thinned, KERNEL bounded or plain. Tables go to the terminal as Markdown; docs/coverage.md holds a
 //! record.
 
 mod cases;
