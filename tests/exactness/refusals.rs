@@ -2,7 +2,7 @@
 
 use crate::place::{Place, Tree, batches_of, checkpoint, computed, header, plan_in, straight};
 use crate::process::{expect, lampyris, run_quietly, work};
-use lampyris::farm::checkpoint::{Reader, Snapshot, write};
+use lampyris::farm::checkpoint::{Reader, Snapshot, VERSION, write};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -55,9 +55,10 @@ fn damaged_checkpoints_are_refused() {
     }
     fs::write(&path, [&whole[..], b"\n"].concat()).unwrap();
     refused(&place, &dir, "damaged: 1 trailing bytes", true);
-    let newer = 3u32.to_le_bytes();
+    let newer = (VERSION + 1).to_le_bytes();
     fs::write(&path, [&whole[..8], &newer, &whole[12..]].concat()).unwrap();
-    refused(&place, &dir, "format version 4 is newer; this program reads version 3", true);
+    let said = format!("format version {} is newer; this program reads version {VERSION}", VERSION + 1);
+    refused(&place, &dir, &said, true);
     let flips = [
         (3, "not a checkpoint of lampyris"),
         (16, "damaged: wrong checksum of the header"),
