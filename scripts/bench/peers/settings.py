@@ -57,8 +57,8 @@ def cached(**choices):
 
 
 CANDIDATES = {
-    ("lampyris", "grid"): product(histories=[1024, 4096, 16384]),
-    ("lampyris", "image"): product(histories=[16, 64, 256], pixel_samples=[1, 4]),
+    ("lampyris", "grid"): product(histories=[4096, 1024, 16384]),
+    ("lampyris", "image"): product(histories=[64, 16, 256], pixel_samples=[4, 1]),
     ("mitsuba", "grid"): [
         {"variant": "llvm_ad_mono", "sampler": "multijitter", "samples": 1024, "rr_depth": 5},
         {"variant": "llvm_ad_mono", "sampler": "multijitter", "samples": 256, "rr_depth": 5},
