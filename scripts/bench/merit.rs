@@ -1,5 +1,5 @@
 //! Figure of merit of the receiver sets of jobs, one thread:
-//! `cargo bench --bench merit -- [--histories N] [--batches N] [--positions N] JOB.toml ...`. Prints a markdown table.
+//! `cargo bench --bench merit -- [--histories N] [--thinning N] [--batches N] [--positions N] JOB.toml ...`. Prints a markdown table.
 //!
 //! FOM = 1 / (mean squared relative error of the bins x CPU seconds), the error from the batches; medians of three seeds. The
 //! sizes of batches and the constants of the remedies were chosen with it, on the jobs of `peers`.
@@ -21,6 +21,7 @@ const SEEDS: u64 = 3;
 struct Asked {
     histories: Option<u64>,
     batches: Option<u64>,
+    thinning: Option<u64>,
     positions: Option<u32>,
 }
 
@@ -33,12 +34,13 @@ fn main() {
         match argument.as_str() {
             "--histories" => asked.histories = Some(number()),
             "--batches" => asked.batches = Some(number()),
+            "--thinning" => asked.thinning = Some(number()),
             "--positions" => asked.positions = Some(number() as u32),
             _ => jobs.push(argument),
         }
     }
     println!(
-        "| job | histories, batches | us a history and bin | error | worst bin | FOM [1/s] |\n|---|---|---|---|---|---|"
+        "| job | histories, thinning, batches | us a history and bin | error | worst bin | FOM [1/s] |\n|---|---|---|---|---|---|"
     );
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread");
     pool.install(|| jobs.iter().for_each(|path| measure(Path::new(path), &asked)));
@@ -48,6 +50,7 @@ fn measure(path: &Path, asked: &Asked) {
     let text = std::fs::read_to_string(path).expect("a job file");
     let mut job = Job::parse(&text, &path.to_string_lossy()).expect("the job is right");
     job.run.histories_per_batch = asked.histories.unwrap_or(job.run.histories_per_batch);
+    job.run.thinning = asked.thinning.unwrap_or(job.run.thinning);
     job.run.batches = asked.batches.unwrap_or(job.run.batches);
     for camera in &mut job.cameras {
         camera.pixel_samples = asked.positions.unwrap_or(camera.pixel_samples);
@@ -59,9 +62,10 @@ fn measure(path: &Path, asked: &Asked) {
     let runs: Vec<[f64; 4]> = (1..=SEEDS).map(|seed| run(&model, &mut job, seed)).collect();
     let of = |k: usize| median(runs.iter().map(|r| r[k]));
     println!(
-        "| {} | {}, {} | {:.4} | {:.3} % | {:.2} % | {:.0} |",
+        "| {} | {}, {}, {} | {:.4} | {:.3} % | {:.2} % | {:.0} |",
         path.file_stem().unwrap_or_default().to_string_lossy(),
         job.run.histories_per_batch,
+        job.run.thinning,
         job.run.batches,
         1e6 * of(0),
         100.0 * of(1),
