@@ -1,17 +1,29 @@
 //! Connections per second of one thread, and trajectories per second: `cargo bench --bench connections`.
 //!
+//! First the connection loop by itself, on the workload of `segments.rs`: lux-meters in the points that a camera sees, and
+//! vertices of trajectories six to a history; a connection is one whose cosines are both positive. Then whole batches.
+//!
 //! Receivers are the pixels of a camera, connected to the vertices of one batch, visibility and sums included.
 //! Times are CPU time of the thread, medians of several runs; on a shared machine compare interleaved runs only.
 
 mod common;
+mod segments;
 
 use common::{load, prepare, thread_time};
 use lampyris::farm::pilot::bounds;
 use lampyris::farm::realization::Realization;
+use lampyris::geometry::kd_order;
+use lampyris::math::Vec3;
+use lampyris::photometry::Colour;
 use lampyris::random::sobol::PointSet;
 use lampyris::random::{Domain, Stream};
+use lampyris::scene::{Model, Surface};
 use lampyris::tally::statistics;
+use lampyris::transport::connection::{Connectors, Link, Rule, TILE, Tile, connect};
+use lampyris::transport::receiver::{Receiver, Response};
 use lampyris::transport::trajectory::{Vertex, trace};
+use lampyris::validate::scenes::{UP, lambert, omni, point};
+use segments::{Place, Segments};
 
 const RUNS: usize = 7;
 const HISTORIES: u64 = 64;
@@ -19,11 +31,65 @@ const HISTORIES: u64 = 64;
 fn main() {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread");
     pool.install(|| {
+        segments::Scene::ALL.into_iter().for_each(connection_loop);
         for (name, side) in [("room", 128), ("cornell", 128), ("blender_room", 64)] {
             bench(name, side);
         }
         points();
     });
+}
+
+/// Visibility, factors and sums: the vertices of a scene of `segments.rs` connected to its receivers.
+fn connection_loop(which: segments::Scene) {
+    let segments = Segments::new(which, 512, 48);
+    let count = segments.triangles.len();
+    let surface = Surface { double_sided: true, ..lambert(0.5, 0.0) };
+    let model = Model {
+        positions: segments.triangles.iter().flatten().map(|p| p.as_dvec3()).collect(),
+        triangles: (0..count as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
+        surface_of: vec![0; count],
+        surfaces: vec![surface],
+        ..Model::default()
+    };
+    let job = format!("scene = \"memory\"\n{}{}", omni([3.0, 2.0, 2.5], 1.0), point("p", [3.0, 2.0, 2.0], UP));
+    let (_, scene) = prepare(&job, model);
+    let place = |p: Vec3| scene.place(p.as_dvec3().to_array());
+    let receiver =
+        |p: &Place| Receiver { position: place(p.point), normal: p.normal.as_dvec3(), response: Response::Cosine };
+    let vertex = |p: &Place| Vertex {
+        position: place(p.point),
+        normal: p.normal.as_dvec3(),
+        w_in: -p.normal.as_dvec3(),
+        weight: Colour::WHITE,
+        primitive: 0,
+        order: 1,
+        after_delta: false,
+    };
+    let mut connectors = Connectors::default();
+    for history in segments.vertices.chunks(6) {
+        connectors.push(&scene, &history.iter().map(vertex).collect::<Vec<_>>());
+    }
+    let places: Vec<_> = segments.receivers.iter().map(|p| p.point.as_dvec3()).collect();
+    let ordered: Vec<Place> = kd_order(&places).into_iter().map(|i| segments.receivers[i as usize]).collect();
+    let link = |p: &Place| Link { owner: 0, receiver: receiver(p), start: Colour::BLACK, watched: false };
+    let tile = |places: &[Place]| Tile::new(&scene, places.iter().map(link).collect(), 0);
+    let tiles: Vec<Tile> = ordered.chunks(TILE).map(tile).collect();
+    let facing = |v: &Place| ordered.iter().filter(|r| v.faces(r)).count();
+    let connections: usize = segments.vertices.iter().map(facing).sum();
+    let rule = Rule { bound: 1.0, channels: 1, orders: 0..u32::MAX };
+    let seconds = median(|| {
+        let start = thread_time();
+        for tile in &tiles {
+            std::hint::black_box(connect(&scene, &connectors, 0..connectors.histories(), tile, &rule));
+        }
+        (thread_time() - start).as_secs_f64()
+    });
+    println!(
+        "{}: {count} triangles, {:.1} M connections/s in the loop ({})",
+        which.letter(),
+        connections as f64 / seconds / 1e6,
+        scene.geometry.path().name()
+    );
 }
 
 fn bench(name: &str, side: u32) {
