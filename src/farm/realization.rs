@@ -1,4 +1,4 @@
-//! One realization of a job: the scores of one batch, with [`super::local`] the only parallel computation.
+//! One realization of a job: the scores of one batch, with `farm::local` and `farm::thinning` the only parallel computation.
 //!
 //! A batch is computed from its index alone. Its trajectories are traced in parallel and collected in index order, and thinned
 //! to histories; then every tile of receivers sums all vertices history by history, so any number of threads gives the same

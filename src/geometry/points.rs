@@ -8,7 +8,7 @@ use crate::math::{DVec3, Vec3};
 /// A box between two corners \[m\].
 pub(super) type Corners = ([f32; 3], [f32; 3]);
 
-/// Up to [`TILE`] lifted points, as the kernel wants them.
+/// Up to [`TILE`](super::visibility::TILE) lifted points, as the kernel wants them.
 #[derive(Debug)]
 pub struct Points {
     pub(super) x: [[f32; BUNDLE]; BUNDLES],
@@ -26,7 +26,7 @@ pub struct Points {
 }
 
 impl Points {
-    /// The tile of `points`, at most [`TILE`] \[m\].
+    /// The tile of `points`, at most [`TILE`](super::visibility::TILE) \[m\].
     pub fn new(geometry: &Geometry, points: &[Vec3]) -> Self {
         let empty = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
         let mut tile = Points {

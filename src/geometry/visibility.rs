@@ -9,7 +9,7 @@
 //! boxes -> 8 triangles as planes through the apex, against each segment that is left, or each triangle against all
 //! ```
 //!
-//! Every step before a triangle is conservative and the planes leave to f64 what they cannot tell ([`super::planes`]), so the
+//! Every step before a triangle is conservative and the planes leave to f64 what they cannot tell (`geometry::planes`), so the
 //! answer for each point is that of [`Geometry::visible`], whatever the tile and the instructions.
 //!
 //! Planes and spheres are asked after the triangles, of the points that are left: on which side, or inside which, a point of the
