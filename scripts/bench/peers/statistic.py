@@ -8,11 +8,13 @@ BLOCK = 32
 
 class Reference:
     """The mean of two programs' long runs, weighted by their mean relative variances: one weight a program, since
-    weights by bin would prefer values that came out low. Bins without a positive value count in nothing."""
+    weights by bin would prefer values that came out low. Bins without a positive value or a known error count in nothing."""
 
     def __init__(self, ours, theirs):
         first, second = ours.values, theirs.values
-        self.bins = np.isfinite(first) & (first > 0) & (second > 0)
+        # Of pixels that no reflected light reached in any batch Lampyris says that the error is not known.
+        known = np.isfinite(ours.variance) & np.isfinite(theirs.variance)
+        self.bins = known & np.isfinite(first) & (first > 0) & (second > 0)
         between = np.where(self.bins, (first + second) / 2, 1.0)
         relative = [np.mean((v / between**2)[self.bins]) for v in (ours.variance, theirs.variance)]
         self.claimed = [figure_of_merit(r, run.seconds) for r, run in zip(relative, (ours, theirs), strict=True)]
