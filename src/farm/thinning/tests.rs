@@ -26,10 +26,12 @@ fn strewn(count: usize) -> Vec<Vertex> {
     (0..count).map(&mut vertex).collect()
 }
 
-/// The connectors' own view of what was chosen from `vertices` by start number `index`.
+/// What is chosen from `vertices` with start number `index`.
 fn choose(scene: &Scene, vertices: &[Vertex], index: u64) -> Vec<Vertex> {
-    let vertices: Vec<&Vertex> = vertices.iter().collect();
-    chosen(scene, &vertices, THINNING, &mut Stream::new(5, Domain::Thinning, "").generator(index))
+    let mut thinning = Thinning::new(scene, THINNING as u64, Stream::new(5, Domain::Thinning, "").generator(index));
+    thinning.take(vertices.iter().copied());
+    thinning.choose();
+    thinning.chosen
 }
 
 #[test]
@@ -103,10 +105,30 @@ fn neighbours_stand_for_each_other() {
 #[test]
 fn histories_share_what_is_chosen_and_nothing_gives_nothing() {
     let (scene, vertices) = (scene(), strewn(1000));
-    let vertices: Vec<&Vertex> = vertices.iter().collect();
-    let mut rng = Stream::new(5, Domain::Thinning, "").generator(0);
-    let connectors = thinned(&scene, &vertices, 16, THINNING, &mut rng);
-    assert_eq!((connectors.histories(), connectors.vertices()), (16, 125));
-    let connectors = thinned(&scene, &[], 16, THINNING, &mut rng);
-    assert_eq!((connectors.histories(), connectors.vertices()), (16, 0));
+    let connectors = |vertices: &[Vertex]| {
+        let mut thinning = Thinning::new(&scene, THINNING as u64, Stream::new(5, Domain::Thinning, "").generator(0));
+        thinning.take(vertices.iter().copied());
+        thinning.finish(16)
+    };
+    let counts = |c: Connectors| (c.histories(), c.vertices());
+    assert_eq!(counts(connectors(&vertices)), (16, 125));
+    assert_eq!(counts(connectors(&[])), (16, 0));
+    // So little light that its share of a choice is no number ends, and is left out.
+    let faint = |v: &Vertex| Vertex { weight: Colour([0.0, 0.0, f64::from_bits(1)]), ..*v };
+    assert_eq!(counts(connectors(&vertices.iter().map(faint).collect::<Vec<_>>())), (16, 0));
+}
+
+#[test]
+fn many_vertices_are_chosen_from_in_turn_and_none_is_lost() {
+    let scene = scene();
+    let vertices = strewn(TOGETHER / 4);
+    let mut thinning = Thinning::new(&scene, THINNING as u64, Stream::new(5, Domain::Thinning, "").generator(0));
+    for _ in 0..5 {
+        thinning.take(vertices.iter().copied());
+    }
+    assert!(thinning.waiting.len() < TOGETHER && !thinning.chosen.is_empty());
+    thinning.choose();
+    let flux = |vertices: &[Vertex]| vertices.iter().map(|v| reflected(&scene, v)).sum::<f64>();
+    let (some, all) = (flux(&thinning.chosen) * THINNING as f64, 5.0 * flux(&vertices));
+    assert!((some / all - 1.0).abs() < 1e-9, "{some} for {all}");
 }
