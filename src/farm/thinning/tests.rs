@@ -12,12 +12,12 @@ fn scene() -> Scene {
     Scene::new(closed_box(DVec3::ONE, &lambert(0.5, 1.0)), &job).unwrap()
 }
 
-/// Vertices strewn over the walls of a unit box, of all weights.
+/// Vertices strewn over walls in a unit box about the origin, of all weights.
 fn strewn(count: usize) -> Vec<Vertex> {
     let mut rng = Stream::new(3, Domain::Trajectory, "strewn").generator(0);
     let mut vertex = |_| {
         let normal = DVec3::AXES[rng.below(3) as usize];
-        let position = (DVec3::ONE - normal) * DVec3::new(rng.uniform(), rng.uniform(), rng.uniform());
+        let position = (DVec3::ONE - normal) * DVec3::new(rng.uniform(), rng.uniform(), rng.uniform()) - 0.5;
         let weight = Colour([rng.uniform(), rng.uniform(), 100.0 * rng.uniform()]);
         let towards = sphere(rng.uniform2());
         let w_in = if towards.dot(normal) < 0.0 { towards } else { -towards };
@@ -86,7 +86,7 @@ fn a_vertex_with_more_than_its_share_is_chosen_again_and_again() {
 fn neighbours_stand_for_each_other() {
     // Of vertices that lie evenly on a wall, those chosen do so too: each quarter of the wall gets its quarter.
     let scene = scene();
-    let at = |i: usize| DVec3::new((i % 64) as f64 / 63.0, 0.0, (i / 64) as f64 / 63.0);
+    let at = |i: usize| DVec3::new((i % 64) as f64 / 63.0, 0.0, (i / 64) as f64 / 63.0) - 0.5;
     let vertex =
         |i| Vertex { position: at(i), normal: DVec3::Y, w_in: -DVec3::Y, weight: Colour::WHITE, ..strewn(1)[0] };
     let vertices: Vec<Vertex> = (0..4096).map(vertex).collect();
@@ -94,7 +94,7 @@ fn neighbours_stand_for_each_other() {
         let chosen = choose(&scene, &vertices, index);
         for quarter in 0..4 {
             let inside = |v: &&Vertex| {
-                (usize::from(v.position.x > 0.5), usize::from(v.position.z > 0.5)) == (quarter % 2, quarter / 2)
+                (usize::from(v.position.x > 0.0), usize::from(v.position.z > 0.0)) == (quarter % 2, quarter / 2)
             };
             let count = chosen.iter().filter(inside).count();
             assert!((127..=129).contains(&count), "start {index}: {count} of 512 in quarter {quarter}");
