@@ -95,6 +95,21 @@ fn bad_values_in_a_job_are_named_with_field_value_and_range() {
             "run.sampling = rqmc: \"random\" with estimator = \"reverse\", whose paths are independent",
         ),
         (
+            "histories_per_batch = 1\nbatches = 4",
+            "histories_per_batch = 1\nthinning = 0\nbatches = 4",
+            "run.thinning = 0: 1 .. 1048576: histories_per_batch x thinning is at most 1048576",
+        ),
+        (
+            "histories_per_batch = 1\nbatches = 4",
+            "histories_per_batch = 1024\nthinning = 1025\nbatches = 4",
+            "run.thinning = 1025: 1 .. 1024",
+        ),
+        (
+            "histories_per_batch = 1\nbatches = 4\nbatches_per_shard = 2\nsampling = \"random\"",
+            "histories_per_batch = 4\nthinning = 3\nbatches = 16",
+            "run.thinning = 3: a power of two: 2 or 4; any number with sampling = \"random\"",
+        ),
+        (
             "histories_per_batch = 1\nbatches = 4\nbatches_per_shard = 2\nsampling = \"random\"",
             "histories_per_batch = 2000\nbatches = 16",
             "run.histories_per_batch = 2000: a power of two: 1024 or 2048; any number with sampling = \"random\"",

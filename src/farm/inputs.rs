@@ -36,7 +36,7 @@ pub fn prepare(path: &Path) -> Result<Prepared> {
         Some(name) => read_model(path, name, &mut files)?,
         None => Model::default(),
     };
-    // Planning asks few rays, and each worker builds the scene again.
+    // Planning asks few rays (one a pixel where a region names a node), and each worker builds the scene again.
     let scene = Scene::built(model, &job, Build::Quick)?;
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let job_file = Input::of(&file_name(path), text.as_bytes());

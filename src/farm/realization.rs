@@ -8,9 +8,9 @@
 use super::local;
 use super::receivers::{CentreSight, ReceiverSet};
 use super::regions::Regions;
-use super::thinning::thinned;
+use super::thinning::Thinning;
 use crate::geometry::kd_order;
-use crate::job::{Channels, Estimator, Job, Run, Sampling};
+use crate::job::{Channels, Estimator, Job, Sampling};
 use crate::random::sobol::PointSet;
 use crate::random::{Domain, Stream};
 use crate::scene::Scene;
@@ -22,6 +22,9 @@ use std::ops::Range;
 
 /// Trajectories traced by one thread at a time.
 const TRAJECTORIES_AT_ONCE: u64 = 64;
+
+/// Trajectories traced before their vertices are thinned, all threads together.
+const WAVE: u64 = 1024;
 
 /// Everything that is the same for every batch of a job.
 pub struct Realization<'a> {
@@ -114,7 +117,7 @@ impl<'a> Realization<'a> {
 
     /// Scores by counting trajectories on the cells of the grids, the only receivers of such a job.
     fn direct_simulation(&self, index: u64) -> (Vec<Scores>, FluxBalance) {
-        let traced = self.trace::<Segment>(index);
+        let traced = self.trace::<Segment>(index, 0..self.job.run.trajectories_per_batch());
         let flux = balance(&traced);
         let sets = self.sets.par_iter().zip(&self.job.grids);
         let count =
@@ -124,18 +127,21 @@ impl<'a> Realization<'a> {
 
     /// The histories of a batch as connectors.
     fn connectors(&self, index: u64) -> (Connectors, FluxBalance) {
-        let traced = self.trace::<Vertex>(index);
-        let Run { histories_per_batch, thinning, .. } = self.job.run;
-        let connectors = if thinning > 1 {
-            let vertices: Vec<&Vertex> = traced.iter().flat_map(|t| &t.records).collect();
-            let rng = &mut self.thinning.generator(index);
-            thinned(self.scene, &vertices, histories_per_batch as usize, thinning as usize, rng)
-        } else {
+        let count = self.job.run.trajectories_per_batch();
+        if self.job.run.thinning == 1 {
+            let traced = self.trace::<Vertex>(index, 0..count);
             let mut connectors = Connectors::default();
             traced.iter().flat_map(Traced::histories).for_each(|vertices| connectors.push(self.scene, vertices));
-            connectors
-        };
-        (connectors, balance(&traced))
+            return (connectors, balance(&traced));
+        }
+        let mut flux = FluxBalance::default();
+        let mut thinning = Thinning::new(self.scene, self.job.run.thinning, self.thinning.generator(index));
+        for start in (0..count).step_by(WAVE as usize) {
+            let traced = self.trace::<Vertex>(index, start..(start + WAVE).min(count));
+            flux.add(&balance(&traced));
+            thinning.take(traced.into_iter().flat_map(|t| t.records));
+        }
+        (thinning.finish(self.job.run.histories_per_batch), flux)
     }
 
     /// The quasi-random set of a batch, where the job asks for one.
@@ -148,15 +154,15 @@ impl<'a> Realization<'a> {
         (self.job.run.sampling == Sampling::Rqmc).then(set)
     }
 
-    /// Traces the trajectories of a batch, in the order of their index.
-    fn trace<T: Send>(&self, index: u64) -> Vec<Traced<T>>
+    /// Traces the trajectories `range` of a batch, in the order of their index.
+    fn trace<T: Send>(&self, index: u64, range: Range<u64>) -> Vec<Traced<T>>
     where
         Vec<T>: Record,
     {
-        let count = self.job.run.trajectories_per_batch();
         let points = self.points(index);
-        let starts: Vec<u64> = (0..count).step_by(TRAJECTORIES_AT_ONCE as usize).collect();
-        let some = |start| self.trace_some(index, start..(start + TRAJECTORIES_AT_ONCE).min(count), points.as_ref());
+        let starts: Vec<u64> = range.clone().step_by(TRAJECTORIES_AT_ONCE as usize).collect();
+        let some =
+            |start| self.trace_some(index, start..(start + TRAJECTORIES_AT_ONCE).min(range.end), points.as_ref());
         starts.into_par_iter().map(some).collect()
     }
 

@@ -5,7 +5,7 @@
 //! neighbours with like normals follow each other, and every F/K lumens of reflected flux one is chosen, from a random start
 //! on, with F the flux of all and K the number wanted. A vertex i that reflects F_i is chosen F_i K/F times on average and
 //! its weight is divided by that, so every sum over vertices keeps its mean; and what is chosen is spread over the
-//! surfaces as the light is, which takes most of the variance that a choice at random would add (docs/method.md, section 4).
+//! surfaces as the light is, which takes most of the variance that a choice at random would add (docs/method.md, section 2).
 //!
 //! The choice never looks at a receiver.
 
@@ -16,46 +16,70 @@ use crate::transport::connection::Connectors;
 use crate::transport::trajectory::Vertex;
 use rayon::prelude::*;
 
+/// Vertices from which is chosen at once, or a little more: a batch of trajectories that hardly end must not fill the memory.
+const TOGETHER: usize = 1 << 20;
 /// Steps along an axis of the space in which vertices are sorted: 2^10.
 const STEPS: f64 = 1024.0;
 /// Bits of the number of a vertex below its key.
 const NUMBER: u32 = 30;
 
-/// The connectors of `histories` that stand for the `vertices` of `thinning` times as many trajectories.
-pub fn thinned(
-    scene: &Scene,
-    vertices: &[&Vertex],
-    histories: usize,
+/// The vertices of a batch on their way through the choice.
+pub struct Thinning<'a> {
+    scene: &'a Scene,
     thinning: usize,
-    rng: &mut Generator,
-) -> Connectors {
-    let chosen = chosen(scene, vertices, thinning, rng);
-    let mut connectors = Connectors::default();
-    for first in 0..histories {
-        // In turn, so that each history holds vertices from everywhere.
-        let own: Vec<Vertex> = chosen.iter().skip(first).step_by(histories).copied().collect();
-        connectors.push(scene, &own);
-    }
-    connectors
+    rng: Generator,
+    /// Not chosen from yet.
+    waiting: Vec<Vertex>,
+    chosen: Vec<Vertex>,
 }
 
-/// One of `thinning` of the `vertices`, with the weight of all for which it stands, over `thinning`.
-fn chosen(scene: &Scene, vertices: &[&Vertex], thinning: usize, rng: &mut Generator) -> Vec<Vertex> {
-    let order = order(vertices);
-    let fluxes: Vec<f64> = order.par_iter().map(|&i| reflected(scene, vertices[i])).collect();
-    let wanted = vertices.len().div_ceil(thinning);
-    let step = fluxes.iter().sum::<f64>() / wanted as f64;
-    let mut chosen = Vec::with_capacity(wanted);
-    let (mut next, mut passed) = (step * rng.uniform(), 0.0);
-    for (i, flux) in order.into_iter().zip(fluxes) {
-        passed += flux;
-        while next < passed {
-            let vertex = *vertices[i];
-            chosen.push(Vertex { weight: vertex.weight * (step / (flux * thinning as f64)), ..vertex });
-            next += step;
+impl<'a> Thinning<'a> {
+    /// One of `thinning` vertices will be chosen, from random starts drawn from `rng`.
+    pub fn new(scene: &'a Scene, thinning: u64, rng: Generator) -> Self {
+        Thinning { scene, thinning: thinning as usize, rng, waiting: Vec::new(), chosen: Vec::new() }
+    }
+
+    /// Takes in the vertices of the next trajectories.
+    pub fn take(&mut self, vertices: impl IntoIterator<Item = Vertex>) {
+        self.waiting.extend(vertices);
+        if self.waiting.len() >= TOGETHER {
+            self.choose();
         }
     }
-    chosen
+
+    /// The connectors of `histories` that stand for all that was taken in.
+    pub fn finish(mut self, histories: u64) -> Connectors {
+        self.choose();
+        let mut connectors = Connectors::default();
+        for first in 0..histories as usize {
+            // In turn, so that each history holds vertices from everywhere.
+            let own: Vec<Vertex> = self.chosen.iter().skip(first).step_by(histories as usize).copied().collect();
+            connectors.push(self.scene, &own);
+        }
+        connectors
+    }
+
+    /// Chooses from those that wait, with the weight of all for which each stands, over `thinning`.
+    fn choose(&mut self) {
+        let order = order(self.scene, &self.waiting);
+        let fluxes: Vec<f64> = order.par_iter().map(|&i| reflected(self.scene, &self.waiting[i])).collect();
+        let wanted = self.waiting.len().div_ceil(self.thinning);
+        let step = fluxes.iter().sum::<f64>() / wanted as f64;
+        // Nothing, or less light than a number can tell from nothing.
+        if step >= f64::MIN_POSITIVE {
+            let (mut next, mut passed) = (step * self.rng.uniform(), 0.0);
+            for (i, flux) in order.into_iter().zip(fluxes) {
+                passed += flux;
+                while next < passed {
+                    let vertex = self.waiting[i];
+                    let weight = vertex.weight * (step / (flux * self.thinning as f64));
+                    self.chosen.push(Vertex { weight, ..vertex });
+                    next += step;
+                }
+            }
+        }
+        self.waiting.clear();
+    }
 }
 
 /// Flux that a vertex reflects, summed over channels, so that none is lost whatever its colour \[lm\].
@@ -65,17 +89,20 @@ fn reflected(scene: &Scene, vertex: &Vertex) -> f64 {
 }
 
 /// The numbers of the vertices, by the axis nearest to the normal and then along a curve through space (Morton's).
-fn order(vertices: &[&Vertex]) -> Vec<usize> {
-    assert!(vertices.len() < 1 << NUMBER, "{} vertices in a batch", vertices.len());
-    let (low, high) = vertices
-        .iter()
-        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), v| (l.min(v.position), h.max(v.position)));
+fn order(scene: &Scene, vertices: &[Vertex]) -> Vec<usize> {
+    assert!(vertices.len() < 1 << NUMBER, "{} vertices at once", vertices.len());
+    // What lies far out on an infinite plane must not stretch the steps.
+    let (centre, radius) = scene.geometry.bounding_sphere();
+    let reach = if radius > 0.0 { radius } else { f64::MAX };
+    let place = |v: &Vertex| v.position.clamp(centre - reach, centre + reach);
+    let (low, high) =
+        vertices.iter().map(place).fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
     let scale = STEPS * (1.0 - 1e-9) / (high - low).max_element().max(f64::MIN_POSITIVE);
-    let key = |(i, v): (usize, &&Vertex)| {
+    let key = |(i, v): (usize, &Vertex)| {
         let axis = v.normal.abs().max_position();
         let side = 2 * axis as u64 + u64::from(v.normal[axis] < 0.0);
-        let place = ((v.position - low) * scale).to_array().map(|x| spread(x as u64));
-        let key = side << 30 | place[0] << 2 | place[1] << 1 | place[2];
+        let [x, y, z] = ((place(v) - low) * scale).to_array().map(|x| spread(x as u64));
+        let key = side << 30 | x << 2 | y << 1 | z;
         key << NUMBER | i as u64
     };
     let mut keys: Vec<u64> = vertices.par_iter().enumerate().map(key).collect();

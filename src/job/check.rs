@@ -147,10 +147,12 @@ fn check_run(c: &Checker, job: &Job) -> Result<()> {
     let run = &job.run;
     c.that("run.seed", run.seed, run.seed < 1 << 63, "0 .. 9223372036854775807")?;
     c.range("run.histories_per_batch", run.histories_per_batch, 1, MAX_TRAJECTORIES)?;
-    c.range("run.thinning", run.thinning, 1, MAX_TRAJECTORIES / run.histories_per_batch)?;
     let local = job.transport.estimator == Estimator::Local;
     let allowed = "1 with estimators other than \"local\", which connect nothing";
     c.that("run.thinning", run.thinning, local || run.thinning == 1, allowed)?;
+    let most = MAX_TRAJECTORIES / run.histories_per_batch;
+    let allowed = format!("1 .. {most}: histories_per_batch x thinning is at most {MAX_TRAJECTORIES}");
+    c.that("run.thinning", run.thinning, (1..=most).contains(&run.thinning), &allowed)?;
     c.range("run.batches", run.batches, 1, 1 << 32)?;
     c.range("run.batches_per_shard", run.batches_per_shard, 1, 1 << 20)?;
     c.that(

@@ -64,7 +64,7 @@ const HISTORIES_OF_METERS: u64 = 1024;
 /// Bins to which a history is connected for each trajectory traced for it, by default: chosen by measured figure of merit
 /// (docs/benchmarks.md).
 const BINS_OF_A_TRAJECTORY: u64 = 128;
-/// The same for the greatest default of the thinning.
+/// Greatest thinning by default.
 const MOST_THINNING: u64 = 64;
 /// Trajectories of a batch, at most, by default: their vertices are in memory at once.
 const TRAJECTORIES: u64 = 1 << 16;

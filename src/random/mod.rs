@@ -19,7 +19,7 @@ const UNIT: f64 = 1.0 / (1u64 << 53) as f64;
 /// What a stream of random numbers is for; switching one use on never shifts another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Domain {
-    /// Light trajectories; the index is the global index of the history.
+    /// Light trajectories; the index is the global index of the trajectory.
     Trajectory,
     /// Sub-pixel positions, mirror choices and area-light samples of one receiver set; the index is
     /// `batch * bins + bin`.

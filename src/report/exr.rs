@@ -63,6 +63,7 @@ fn attributes(plan: &Plan, merged: &Merged, values: &SetValues) -> LayerAttribut
         ("estimate", estimate_label(plan).to_owned()),
         ("batches", merged.batches.to_string()),
         ("historiesPerBatch", run.histories_per_batch.to_string()),
+        ("thinning", run.thinning.to_string()),
         ("histories", (merged.batches * run.histories_per_batch).to_string()),
         ("seed", run.seed.to_string()),
         ("planDigest", plan.digest.clone()),

@@ -15,6 +15,9 @@ use std::ops::Range;
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 
+/// Longest name of instructions \[bytes\].
+const LONGEST_NAME: usize = 16;
+
 /// As much as the system reads at one wish \[bytes\].
 const STRIDE: u64 = 1 << 20;
 
@@ -266,6 +269,10 @@ fn check_header(header: &Header, plan: &Plan, shard: u64, shapes: &[SetShape]) -
     }
     if !(header.seconds.is_finite() && header.seconds >= 0.0) {
         return Err("damaged: its time is not a time".to_owned());
+    }
+    let name = &header.instructions;
+    if name.len() > LONGEST_NAME || !name.bytes().all(|b| b.is_ascii_alphanumeric()) {
+        return Err("damaged: its instructions have no such name".to_owned());
     }
     Ok(())
 }

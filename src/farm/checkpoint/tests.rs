@@ -142,6 +142,8 @@ fn hostile_headers_are_refused_without_allocating_what_they_claim() {
     assert!(forged(|h, _| h.digests = vec![[0; 16]; 5]).contains("5 batches in a shard of 4"));
     assert!(forged(|h, _| h.seconds = f64::NAN).contains("not a time"));
     assert!(forged(|h, _| h.seconds = -1.0).contains("not a time"));
+    assert!(forged(|h, _| h.instructions = "avx\u{7}".into()).contains("no such name"));
+    assert!(forged(|h, _| h.instructions = "a".repeat(17)).contains("no such name"));
     // One batch more than the replicates hold.
     assert!(forged(|h, _| h.digests.push([1; 16])).contains("not of the plan's shape"));
 }

@@ -17,6 +17,8 @@ const PROCESS: u64 = 32 << 20;
 const VERTICES: u64 = 32;
 /// One vertex with its weight and surface \[bytes\].
 const VERTEX: u64 = 128;
+/// Vertices from which is chosen at once, at most, and those of the trajectories traced meanwhile.
+const WAITING: u64 = (1 << 20) + 1024 * VERTICES;
 /// One receiver of a bin, placed anew in each batch \[bytes\].
 const RECEIVER: u64 = 256;
 /// One f64 \[bytes\].
@@ -50,7 +52,7 @@ impl Plan {
         let tally: u64 = sets.iter().map(|s| tally_bytes(s, of_shard)).fold(0, u64::saturating_add);
         let flux = kept_bytes(FLUX_BINS.len() as u64, of_shard).saturating_add(DIGEST * of_shard);
         let scores: u64 = sets.iter().map(|s| score_bytes(s, run.histories_per_batch)).fold(0, u64::saturating_add);
-        let vertices = run.trajectories_per_batch().saturating_mul(VERTICES * VERTEX);
+        let vertices = vertex_bytes(run.histories_per_batch, run.thinning);
         let checkpoint = tally.saturating_add(flux);
         let worker = [PROCESS, self.scene.bytes, checkpoint, scores, vertices].into_iter().fold(0, u64::saturating_add);
         let checkpoints = checkpoint.saturating_mul(self.shard_count());
@@ -121,6 +123,13 @@ fn tally_bytes(set: &SetShape, batches: u64) -> u64 {
         Kept::EveryBatch => (4 * bins * NUMBER).saturating_add(kept_bytes(bins, batches)),
     };
     kept.saturating_add(monitor_bytes(set, batches))
+}
+
+/// Vertices of a batch that are connected, and those from which they are chosen: not all at once where they are many.
+fn vertex_bytes(histories: u64, thinning: u64) -> u64 {
+    let connected = histories.saturating_mul(VERTICES);
+    let traced = if thinning > 1 { connected.saturating_mul(thinning).min(WAITING) } else { 0 };
+    connected.saturating_add(traced).saturating_mul(VERTEX)
 }
 
 /// Scores, receivers and single histories of one batch.

@@ -12,12 +12,12 @@ fn scene() -> Scene {
     Scene::new(closed_box(DVec3::ONE, &lambert(0.5, 1.0)), &job).unwrap()
 }
 
-/// Vertices strewn over the walls of a unit box, of all weights.
+/// Vertices strewn over walls in a unit box about the origin, of all weights.
 fn strewn(count: usize) -> Vec<Vertex> {
     let mut rng = Stream::new(3, Domain::Trajectory, "strewn").generator(0);
     let mut vertex = |_| {
         let normal = DVec3::AXES[rng.below(3) as usize];
-        let position = (DVec3::ONE - normal) * DVec3::new(rng.uniform(), rng.uniform(), rng.uniform());
+        let position = (DVec3::ONE - normal) * DVec3::new(rng.uniform(), rng.uniform(), rng.uniform()) - 0.5;
         let weight = Colour([rng.uniform(), rng.uniform(), 100.0 * rng.uniform()]);
         let towards = sphere(rng.uniform2());
         let w_in = if towards.dot(normal) < 0.0 { towards } else { -towards };
@@ -26,10 +26,12 @@ fn strewn(count: usize) -> Vec<Vertex> {
     (0..count).map(&mut vertex).collect()
 }
 
-/// The connectors' own view of what was chosen from `vertices` by start number `index`.
+/// What is chosen from `vertices` with start number `index`.
 fn choose(scene: &Scene, vertices: &[Vertex], index: u64) -> Vec<Vertex> {
-    let vertices: Vec<&Vertex> = vertices.iter().collect();
-    chosen(scene, &vertices, THINNING, &mut Stream::new(5, Domain::Thinning, "").generator(index))
+    let mut thinning = Thinning::new(scene, THINNING as u64, Stream::new(5, Domain::Thinning, "").generator(index));
+    thinning.take(vertices.iter().copied());
+    thinning.choose();
+    thinning.chosen
 }
 
 #[test]
@@ -84,7 +86,7 @@ fn a_vertex_with_more_than_its_share_is_chosen_again_and_again() {
 fn neighbours_stand_for_each_other() {
     // Of vertices that lie evenly on a wall, those chosen do so too: each quarter of the wall gets its quarter.
     let scene = scene();
-    let at = |i: usize| DVec3::new((i % 64) as f64 / 63.0, 0.0, (i / 64) as f64 / 63.0);
+    let at = |i: usize| DVec3::new((i % 64) as f64 / 63.0, 0.0, (i / 64) as f64 / 63.0) - 0.5;
     let vertex =
         |i| Vertex { position: at(i), normal: DVec3::Y, w_in: -DVec3::Y, weight: Colour::WHITE, ..strewn(1)[0] };
     let vertices: Vec<Vertex> = (0..4096).map(vertex).collect();
@@ -92,7 +94,7 @@ fn neighbours_stand_for_each_other() {
         let chosen = choose(&scene, &vertices, index);
         for quarter in 0..4 {
             let inside = |v: &&Vertex| {
-                (usize::from(v.position.x > 0.5), usize::from(v.position.z > 0.5)) == (quarter % 2, quarter / 2)
+                (usize::from(v.position.x > 0.0), usize::from(v.position.z > 0.0)) == (quarter % 2, quarter / 2)
             };
             let count = chosen.iter().filter(inside).count();
             assert!((127..=129).contains(&count), "start {index}: {count} of 512 in quarter {quarter}");
@@ -103,10 +105,30 @@ fn neighbours_stand_for_each_other() {
 #[test]
 fn histories_share_what_is_chosen_and_nothing_gives_nothing() {
     let (scene, vertices) = (scene(), strewn(1000));
-    let vertices: Vec<&Vertex> = vertices.iter().collect();
-    let mut rng = Stream::new(5, Domain::Thinning, "").generator(0);
-    let connectors = thinned(&scene, &vertices, 16, THINNING, &mut rng);
-    assert_eq!((connectors.histories(), connectors.vertices()), (16, 125));
-    let connectors = thinned(&scene, &[], 16, THINNING, &mut rng);
-    assert_eq!((connectors.histories(), connectors.vertices()), (16, 0));
+    let connectors = |vertices: &[Vertex]| {
+        let mut thinning = Thinning::new(&scene, THINNING as u64, Stream::new(5, Domain::Thinning, "").generator(0));
+        thinning.take(vertices.iter().copied());
+        thinning.finish(16)
+    };
+    let counts = |c: Connectors| (c.histories(), c.vertices());
+    assert_eq!(counts(connectors(&vertices)), (16, 125));
+    assert_eq!(counts(connectors(&[])), (16, 0));
+    // So little light that its share of a choice is no number ends, and is left out.
+    let faint = |v: &Vertex| Vertex { weight: Colour([0.0, 0.0, f64::from_bits(1)]), ..*v };
+    assert_eq!(counts(connectors(&vertices.iter().map(faint).collect::<Vec<_>>())), (16, 0));
+}
+
+#[test]
+fn many_vertices_are_chosen_from_in_turn_and_none_is_lost() {
+    let scene = scene();
+    let vertices = strewn(TOGETHER / 4);
+    let mut thinning = Thinning::new(&scene, THINNING as u64, Stream::new(5, Domain::Thinning, "").generator(0));
+    for _ in 0..5 {
+        thinning.take(vertices.iter().copied());
+    }
+    assert!(thinning.waiting.len() < TOGETHER && !thinning.chosen.is_empty());
+    thinning.choose();
+    let flux = |vertices: &[Vertex]| vertices.iter().map(|v| reflected(&scene, v)).sum::<f64>();
+    let (some, all) = (flux(&thinning.chosen) * THINNING as f64, 5.0 * flux(&vertices));
+    assert!((some / all - 1.0).abs() < 1e-9, "{some} for {all}");
 }
