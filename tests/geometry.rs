@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::scenes::{add_quad, lambert};
+use common::scenes::{add_quad, bumpy_sphere, lambert};
 use lampyris::geometry::simd::Path;
 use lampyris::geometry::{Geometry, Hit, Mesh, Plane, Ray, Sphere};
 use lampyris::math::{DVec3, Vec3};
@@ -108,25 +108,6 @@ fn segments_are_blocked_as_by_brute_force() {
         let a = 0.01 * Vec3::ONE;
         assert!(geometry.visible(a, a + Vec3::X * length), "nothing lies within {length} m of a point in the air");
     }
-}
-
-/// A closed surface of many triangles: an octahedron's faces divided `depth` times, pushed out to a bumpy sphere.
-fn bumpy_sphere(depth: u32) -> Vec<[Vec3; 3]> {
-    let axes = [DVec3::X, DVec3::Y, DVec3::NEG_X, DVec3::NEG_Y];
-    let mut faces: Vec<[DVec3; 3]> = Vec::new();
-    for i in 0..4 {
-        let (a, b) = (axes[i], axes[(i + 1) % 4]);
-        faces.extend([[a, b, DVec3::Z], [b, a, DVec3::NEG_Z]]);
-    }
-    for _ in 0..depth {
-        let split = |[a, b, c]: [DVec3; 3]| {
-            let (x, y, z) = ((a + b).normalize(), (b + c).normalize(), (c + a).normalize());
-            [[a, x, z], [x, b, y], [z, y, c], [x, y, z]]
-        };
-        faces = faces.into_iter().flat_map(split).collect();
-    }
-    let push = |p: DVec3| (p * (1.0 + 0.2 * p.x * p.y + 0.1 * p.z * p.z)).as_vec3();
-    faces.into_iter().map(|f| f.map(push)).collect()
 }
 
 #[test]

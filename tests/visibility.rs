@@ -1,6 +1,9 @@
 //! The visibility kernel on every path against brute force in f64: the same masks bit for bit, whatever the geometry, the
 //! tile and the apex; and closed surfaces through which nothing passes.
 
+mod common;
+
+use common::scenes::bumpy_sphere;
 use lampyris::geometry::simd::{Isa, Kernel, Path};
 use lampyris::geometry::visibility::{BUNDLE, BUNDLES, Lanes, Points, Scratch, TILE};
 use lampyris::geometry::{Geometry, Mesh, Plane, Sphere, kd_order};
@@ -245,25 +248,6 @@ fn degenerate() -> Vec<Triangle> {
     all
 }
 
-/// A closed surface: an octahedron's faces divided `depth` times, pushed out to a bumpy sphere.
-fn bumpy(depth: u32) -> Vec<Triangle> {
-    let axes = [DVec3::X, DVec3::Y, DVec3::NEG_X, DVec3::NEG_Y];
-    let mut faces: Vec<[DVec3; 3]> = Vec::new();
-    for i in 0..4 {
-        let (a, b) = (axes[i], axes[(i + 1) % 4]);
-        faces.extend([[a, b, DVec3::Z], [b, a, DVec3::NEG_Z]]);
-    }
-    for _ in 0..depth {
-        let split = |[a, b, c]: [DVec3; 3]| {
-            let (x, y, z) = ((a + b).normalize(), (b + c).normalize(), (c + a).normalize());
-            [[a, x, z], [x, b, y], [z, y, c], [x, y, z]]
-        };
-        faces = faces.into_iter().flat_map(split).collect();
-    }
-    let push = |p: DVec3| (p * (1.0 + 0.2 * p.x * p.y + 0.1 * p.z * p.z)).as_vec3();
-    faces.into_iter().map(|f| f.map(push)).collect()
-}
-
 /// The closed box of half sides `half`.
 fn room(half: DVec3) -> Vec<Triangle> {
     let corner = |i: usize| {
@@ -389,7 +373,7 @@ fn masks_are_those_of_brute_force_on_planes_in_common() {
 
 #[test]
 fn masks_are_those_of_brute_force_on_touching_triangles() {
-    check("bumpy", bumpy(3), 300);
+    check("bumpy", bumpy_sphere(3), 300);
     check("room", room(DVec3::new(3.0, 1.5, 2.0)), 500);
     check("rotated room", rotated(room(DVec3::new(3.0, 1.5, 2.0))), 500);
     let nested: Vec<_> = (1..20).flat_map(|i| room(DVec3::splat(f64::from(i) * 0.1))).collect();
@@ -399,7 +383,7 @@ fn masks_are_those_of_brute_force_on_touching_triangles() {
 #[test]
 fn masks_are_those_of_brute_force_far_out_and_at_large_and_small_scale() {
     let far = DVec3::new(1000.0, 1000.0, -1000.0);
-    for (name, triangles) in [("soup", soup("soup", 200)), ("slivers", slivers()), ("bumpy", bumpy(2))] {
+    for (name, triangles) in [("soup", soup("soup", 200)), ("slivers", slivers()), ("bumpy", bumpy_sphere(2))] {
         check(&format!("{name} far out"), moved(triangles.clone(), 1.0, far), 200);
         check(&format!("{name} of kilometres"), moved(triangles.clone(), 1000.0, DVec3::ZERO), 200);
         check(&format!("{name} of micrometres"), moved(triangles, 1e-6, DVec3::ZERO), 200);
@@ -485,7 +469,7 @@ fn closed_surfaces_leak_nothing() {
     let closed = [
         Closed { name: "room", triangles: room(half), inside: 1.5, outside: half.length() },
         Closed { name: "rotated room", triangles: rotated(room(half)), inside: 1.5, outside: half.length() },
-        Closed { name: "bumpy", triangles: bumpy(5), inside: 0.7, outside: 1.3 },
+        Closed { name: "bumpy", triangles: bumpy_sphere(5), inside: 0.7, outside: 1.3 },
         Closed { name: "cube", triangles: room(DVec3::splat(0.1)), inside: 0.1, outside: 0.18 },
     ];
     for closed in &closed {

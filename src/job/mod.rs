@@ -66,7 +66,7 @@ const HISTORIES_OF_METERS: u64 = 1024;
 const BINS_OF_A_TRAJECTORY: u64 = 128;
 /// Greatest thinning by default.
 const MOST_THINNING: u64 = 64;
-/// Trajectories of a batch, at most, by default: their vertices are in memory at once.
+/// Trajectories of a batch, at most, by default.
 const TRAJECTORIES: u64 = 1 << 16;
 
 /// `[run]`: seed, division of work and confidence.
