@@ -7,7 +7,7 @@ use std::iter::Sum;
 use std::ops::{Add, AddAssign, Div, Mul, MulAssign};
 
 /// Luminance of the linear Rec.709 primaries (sum 1).
-const REC709: [f64; 3] = [0.2126, 0.7152, 0.0722];
+pub const REC709: [f64; 3] = [0.2126, 0.7152, 0.0722];
 
 /// Linear Rec.709 triple of a photometric quantity or of a reflectance, weighted so that
 /// 0.2126 R + 0.7152 G + 0.0722 B is the photometric value itself.

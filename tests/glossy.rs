@@ -3,16 +3,16 @@
 
 mod common;
 
-use common::scenes::{add_quad, closed_box, lambert, point, spot_camera};
+use common::scenes::{add_quad, closed_box, lambert, omni, point, spot_camera};
 use common::{Case, Estimate, assert_all, compare, difference};
 use lampyris::geometry::Ray;
 use lampyris::math::{DVec3, PI, to_world};
 use lampyris::photometry::Colour;
-use lampyris::random::{Domain, Generator, Stream, cosine_hemisphere};
+use lampyris::random::{Domain, Generator, Stream, cosine_hemisphere, sphere};
 use lampyris::scene::{Model, Reflectance, Scene, Surface};
-use lampyris::transport::connection::Connectors;
+use lampyris::transport::connection::{Connectors, Link, Rule, TILE, Tile, connect};
 use lampyris::transport::receiver::{Receiver, Response};
-use lampyris::transport::trajectory::trace;
+use lampyris::transport::trajectory::{Vertex, trace};
 
 fn glossy(emission: f64) -> Surface {
     Surface {
@@ -188,4 +188,64 @@ fn glossy_receiver_in_a_white_furnace() {
         compare(format!("direction {i}"), Estimate::from_scores(scores.iter().map(|s| s[i])), exact)
     });
     assert_all(&all.collect::<Vec<_>>());
+}
+
+#[test]
+fn connections_in_lanes_are_those_of_single_pairs() {
+    // Walls of four laws: peaked metal, plastic, a mirror over a matt ground, and matt.
+    let laws = [(1.0, 0.2), (0.0, 0.5), (0.0, 0.0), (0.0, 1.0), (0.4, 0.6), (1.0, 0.7)];
+    let mut model = closed_box(DVec3::ONE, &lambert(0.5, 0.0));
+    for (surface, (metallic, roughness)) in model.surfaces.iter_mut().zip(laws) {
+        surface.reflectance = Reflectance::metallic_roughness(Colour([0.7, 0.5, 0.2]), metallic, roughness);
+    }
+    let job =
+        "[run]\nchannels = \"rgb\"\n".to_owned() + &omni([0.5, 0.6, 0.4], 1.0) + &point("p", [0.5; 3], [0.0, 1.0, 0.0]);
+    let case = Case::new(&job, model);
+    let scene = &case.scene;
+    let mut rng = Stream::new(3, Domain::Receiver, "pairs").generator(0);
+    let (mut vertices, mut receivers) = (Vec::<Vertex>::new(), Vec::new());
+    for i in 0..TILE {
+        let origin = scene.place([0.3, 0.4, 0.55]);
+        let hit = scene.geometry.closest_hit(&Ray { origin, direction: sphere(rng.uniform2()) }).expect("a wall");
+        let to_eye = to_world(hit.normal, cosine_hemisphere(rng.uniform2()));
+        let attenuation = Colour([1.0, 0.5, 0.25]);
+        let carried = [0.0, 0.3, 2.0][i % 3];
+        let response = Response::reflectance(scene, (hit.primitive, hit.normal), to_eye, attenuation, carried);
+        receivers.push(Receiver { position: hit.position.as_vec3().as_dvec3(), normal: hit.normal, response });
+        trace(scene, &case.job.transport, &mut rng, &mut vertices);
+    }
+    for vertex in &mut vertices {
+        vertex.position = vertex.position.as_vec3().as_dvec3();
+    }
+    vertices.truncate(64);
+    for bound in [0.7, f64::INFINITY] {
+        for vertex in &vertices {
+            let mut histories = Connectors::default();
+            histories.push(scene, &[*vertex]);
+            let link = |(owner, &receiver)| Link { owner, receiver, start: Colour::BLACK, watched: false };
+            let tile = Tile::new(scene, (0..).zip(&receivers).map(link).collect(), 0);
+            let connected = connect(scene, &histories, 0..1, &tile, &Rule { bound, channels: 3, orders: 0..u32::MAX });
+            for (receiver, connected) in receivers.iter().zip(connected) {
+                let expected = pair(scene, vertex, receiver, bound);
+                for (one, other) in connected.sum.0.into_iter().zip(expected.0) {
+                    assert!((one - other).abs() <= 1e-4 * other + 1e-9, "{one} {other}: {vertex:?} {receiver:?}");
+                }
+            }
+        }
+    }
+}
+
+/// The light that `vertex` sends to `receiver` in an empty convex room, up to the bound, in f64.
+fn pair(scene: &Scene, vertex: &Vertex, receiver: &Receiver, bound: f64) -> Colour {
+    let to = receiver.position - vertex.position;
+    let (w, squared) = (to.normalize(), to.length_squared());
+    let factor = vertex.normal.dot(w).max(0.0) * (-receiver.normal.dot(w)).max(0.0) / squared;
+    if factor <= 1e-12 {
+        return Colour::BLACK;
+    }
+    let reflectance = &scene.surface(vertex.primitive).reflectance;
+    let f = reflectance.evaluate(vertex.normal, vertex.w_in, w);
+    let (response, peak) = receiver.response.with_peak(scene, receiver.normal, w);
+    let bound = if vertex.after_delta { f64::INFINITY } else { bound };
+    vertex.weight * f * response * factor.min(bound / (peak * reflectance.peak(f)))
 }

@@ -13,11 +13,11 @@ use common::{load, prepare, thread_time};
 use lampyris::farm::pilot::bounds;
 use lampyris::farm::realization::Realization;
 use lampyris::geometry::kd_order;
-use lampyris::math::Vec3;
+use lampyris::math::{DVec3, Vec3};
 use lampyris::photometry::Colour;
 use lampyris::random::sobol::PointSet;
 use lampyris::random::{Domain, Stream};
-use lampyris::scene::{Model, Surface};
+use lampyris::scene::{Model, Reflectance, Surface};
 use lampyris::tally::statistics;
 use lampyris::transport::connection::{Connectors, Link, Rule, TILE, Tile, connect};
 use lampyris::transport::receiver::{Receiver, Response};
@@ -31,7 +31,13 @@ const HISTORIES: u64 = 64;
 fn main() {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread");
     pool.install(|| {
-        segments::Scene::ALL.into_iter().for_each(connection_loop);
+        for which in segments::Scene::ALL {
+            connection_loop(which, "lux-meters, matt vertices", Reflectance::Lambert(Colour::grey(0.5)));
+        }
+        let plastic = Reflectance::metallic_roughness(Colour::grey(0.5), 0.0, 0.5);
+        connection_loop(segments::Scene::ALL[0], "eyes on GGX over matt, vertices of the same", plastic);
+        let metal = Reflectance::metallic_roughness(Colour::grey(0.5), 1.0, 0.5);
+        connection_loop(segments::Scene::ALL[0], "eyes on GGX of metal, vertices of the same", metal);
         for (name, side) in [("room", 128), ("cornell", 128), ("blender_room", 64)] {
             bench(name, side);
         }
@@ -40,10 +46,11 @@ fn main() {
 }
 
 /// Visibility, factors and sums: the vertices of a scene of `segments.rs` connected to its receivers.
-fn connection_loop(which: segments::Scene) {
+fn connection_loop(which: segments::Scene, what: &str, reflectance: Reflectance) {
     let segments = Segments::new(which, 512, 48);
     let count = segments.triangles.len();
-    let surface = Surface { double_sided: true, ..lambert(0.5, 0.0) };
+    let matt = reflectance.lambert().is_some();
+    let surface = Surface { double_sided: true, reflectance, ..lambert(0.5, 0.0) };
     let model = Model {
         positions: segments.triangles.iter().flatten().map(|p| p.as_dvec3()).collect(),
         triangles: (0..count as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
@@ -54,8 +61,14 @@ fn connection_loop(which: segments::Scene) {
     let job = format!("scene = \"memory\"\n{}{}", omni([3.0, 2.0, 2.5], 1.0), point("p", [3.0, 2.0, 2.0], UP));
     let (_, scene) = prepare(&job, model);
     let place = |p: Vec3| scene.place(p.as_dvec3().to_array());
-    let receiver =
-        |p: &Place| Receiver { position: place(p.point), normal: p.normal.as_dvec3(), response: Response::Cosine };
+    let response = |normal: DVec3| match matt {
+        true => Response::Cosine,
+        false => Response::reflectance(&scene, (0, normal), normal, Colour::WHITE, 0.0),
+    };
+    let receiver = |p: &Place| {
+        let normal = p.normal.as_dvec3();
+        Receiver { position: place(p.point), normal, response: response(normal) }
+    };
     let vertex = |p: &Place| Vertex {
         position: place(p.point),
         normal: p.normal.as_dvec3(),
@@ -85,7 +98,7 @@ fn connection_loop(which: segments::Scene) {
         (thread_time() - start).as_secs_f64()
     });
     println!(
-        "{}: {count} triangles, {:.1} M connections/s in the loop ({})",
+        "{}: {count} triangles, {:.1} M connections/s in the loop ({}; {what})",
         which.letter(),
         connections as f64 / seconds / 1e6,
         scene.geometry.path().name()

@@ -10,6 +10,7 @@
 
 #![allow(unsafe_code, reason = "instructions that the compiler cannot know the processor to have; see `Path::run`")]
 
+pub mod exact;
 mod plain;
 mod wide;
 
@@ -188,6 +189,8 @@ pub trait Vector: Copy {
     fn mul_add(self, factor: Self, term: Self) -> Self;
     /// self x factor - term, rounded once or twice.
     fn mul_sub(self, factor: Self, term: Self) -> Self;
+    /// Square roots, correctly rounded; NaN of negative numbers.
+    fn sqrt(self) -> Self;
     /// Magnitudes.
     fn abs(self) -> Self;
     /// Negated where the sign bit of `sign` is set.

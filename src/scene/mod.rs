@@ -10,7 +10,7 @@ mod reflectance;
 mod source;
 
 pub use nodes::{Node, Nodes};
-pub use reflectance::{Reflectance, Scattered, weight_over_tolerated};
+pub use reflectance::{LawInLanes, Reflectance, Scattered, weight_over_tolerated, weights_over_tolerated};
 pub use source::{Emission, Emitter, Light, Sources};
 
 use crate::error::{Error, Result};

@@ -19,15 +19,20 @@
 use super::connectors::Connector;
 use super::receiver::Receiver;
 use super::totals::{Column, Sums, Totals};
+use super::varying::Varying;
+use crate::geometry::simd::exact::{Triple, dot, scale, splat, sub};
 use crate::geometry::simd::{Isa, Kernel, Vector};
 use crate::geometry::visibility::{BUNDLE, BUNDLES, Lanes, Points, Scratch};
 use crate::math::Vec3;
 use crate::photometry::Colour;
-use crate::scene::Scene;
+use crate::scene::{Scene, weights_over_tolerated};
 use std::ops::Range;
 
 pub use super::connectors::{Connectors, LitPoint};
 pub use crate::geometry::visibility::TILE;
+
+/// Squared lengths below this are taken for it: a receiver there is at the vertex itself \[m2\].
+const NOWHERE: f32 = 1e-30;
 
 /// A point to which histories are connected on behalf of an owner: the receiver itself, or a point of its continuation.
 #[derive(Clone, Copy, Debug)]
@@ -115,19 +120,9 @@ impl<const C: usize> Kernel for Channels<'_, C> {
 }
 
 #[inline(always)]
-fn splat<I: Isa>(v: Vec3) -> [I::Sixteen; 3] {
-    [I::Sixteen::splat(v.x), I::Sixteen::splat(v.y), I::Sixteen::splat(v.z)]
-}
-
-#[inline(always)]
-fn lanes<I: Isa>(columns: &[Column; 3], bundle: usize) -> [I::Sixteen; 3] {
+fn lanes<I: Isa>(columns: &[Column; 3], bundle: usize) -> Triple<I::Sixteen> {
     let [x, y, z] = columns;
     [I::Sixteen::load(&x[bundle]), I::Sixteen::load(&y[bundle]), I::Sixteen::load(&z[bundle])]
-}
-
-#[inline(always)]
-fn dot<I: Isa>(a: &[I::Sixteen; 3], b: &[I::Sixteen; 3]) -> I::Sixteen {
-    a[0].mul(b[0]).add(a[1].mul(b[1])).add(a[2].mul(b[2]))
 }
 
 /// At most [`TILE`] links as a structure of arrays.
@@ -141,7 +136,7 @@ pub struct Tile {
     lifted: Points,
     /// Response of each receiver where it does not depend on direction.
     pub(super) constant: Vec<Option<Colour>>,
-    all_constant: bool,
+    varying: Option<Box<Varying>>,
     /// Receivers that take no light from the shared points of an emitter.
     refused: Vec<(u32, Lanes)>,
 }
@@ -163,7 +158,7 @@ impl Tile {
             position: [column(&|r| r.position.x), column(&|r| r.position.y), column(&|r| r.position.z)],
             normal: [column(&|r| r.normal.x), column(&|r| r.normal.y), column(&|r| r.normal.z)],
             lifted: Points::new(&scene.geometry, &lifted),
-            all_constant: constant.iter().all(Option::is_some),
+            varying: Varying::new(scene, &links),
             constant,
             links,
             refused: Vec::new(),
@@ -226,15 +221,14 @@ impl Tile {
     /// Geometric factors G without visibility; 0 where vertex or receiver faces away, and not `seen` \[1/m2\].
     #[inline(always)]
     fn factors<I: Isa>(&self, vertex: &Connector, factors: &mut Column, seen: &mut Lanes) {
-        let (p, n) = (splat::<I>(vertex.position), splat::<I>(vertex.normal));
+        let (p, n) = (splat(vertex.position), splat(vertex.normal));
         let zero = I::Sixteen::splat(0.0);
         for bundle in 0..self.bundles().min(BUNDLES) {
-            let to = lanes::<I>(&self.position, bundle);
-            let w = [to[0].sub(p[0]), to[1].sub(p[1]), to[2].sub(p[2])];
-            let leaving = dot::<I>(&n, &w).max(zero);
-            let arriving = zero.sub(dot::<I>(&lanes::<I>(&self.normal, bundle), &w)).max(zero);
+            let w = sub(&lanes::<I>(&self.position, bundle), &p);
+            let leaving = dot(&n, &w).max(zero);
+            let arriving = zero.sub(dot(&lanes::<I>(&self.normal, bundle), &w)).max(zero);
             // A receiver at the vertex itself has no direction and gets nothing, not NaN.
-            let inverse = I::Sixteen::splat(1.0).div(dot::<I>(&w, &w).max(I::Sixteen::splat(1e-30)));
+            let inverse = I::Sixteen::splat(1.0).div(dot(&w, &w).max(I::Sixteen::splat(NOWHERE)));
             let factor = leaving.mul(inverse).mul(arriving.mul(inverse));
             factor.store(&mut factors[bundle]);
             seen[bundle] = zero.less(factor) as u16;
@@ -253,8 +247,8 @@ impl Tile {
         bound: f32,
         sums: &mut [Column; C],
     ) {
-        if vertex.glossy.is_some() || !self.all_constant {
-            return self.spread_varying(scene, vertex, factors, seen, bound, sums);
+        if vertex.glossy.is_some() || self.varying.is_some() {
+            return self.spread_varying::<I, C>(scene, vertex, factors, seen, bound, sums);
         }
         let most = I::Sixteen::splat(bound);
         for bundle in 0..self.bundles().min(BUNDLES) {
@@ -267,8 +261,8 @@ impl Tile {
     }
 
     /// The same where it needs the direction of each connection, at the vertex or at the receiver.
-    #[inline(never)]
-    fn spread_varying<const C: usize>(
+    #[inline(always)]
+    fn spread_varying<I: Isa, const C: usize>(
         &self,
         scene: &Scene,
         vertex: &Connector,
@@ -277,29 +271,49 @@ impl Tile {
         bound: f32,
         sums: &mut [Column; C],
     ) {
-        for i in 0..self.links.len() {
-            let (bundle, lane) = (i / BUNDLE, i % BUNDLE);
-            if seen[bundle] >> lane & 1 == 0 {
+        let (p, n) = (splat(vertex.position), splat(vertex.normal));
+        for bundle in 0..self.bundles().min(BUNDLES) {
+            let here = u32::from(seen[bundle]);
+            if here == 0 {
                 continue;
             }
-            let receiver = &self.links[i].receiver;
-            let w = (receiver.position - vertex.position.as_dvec3()).normalize();
-            let (mut value, mut peak) = (vertex.intensity, 1.0);
-            if let Some(v) = &vertex.glossy {
-                let reflectance = &scene.surface(v.primitive).reflectance;
-                let f = reflectance.evaluate(v.normal, v.w_in, w);
-                value = (v.weight * f).0.map(|c| c as f32);
-                peak = reflectance.peak(f);
+            let w = sub(&lanes::<I>(&self.position, bundle), &p);
+            let length = dot(&w, &w).max(I::Sixteen::splat(NOWHERE)).sqrt();
+            let w = scale(&w, I::Sixteen::splat(1.0).div(length));
+            let (mut value, mut peak) = sent::<I, C>(scene, vertex, &n, &w);
+            if let Some(varying) = &self.varying {
+                let from = scale(&w, I::Sixteen::splat(-1.0));
+                let normal = lanes::<I>(&self.normal, bundle);
+                let (response, of_receiver) = varying.respond::<I, C>(scene, bundle, here, &normal, &from);
+                for c in 0..C {
+                    value[c] = value[c].mul(response[c]);
+                }
+                peak = peak.mul(of_receiver);
             }
-            if self.constant[i].is_none() {
-                let (response, of_receiver) = receiver.response.with_peak(scene, receiver.normal, w);
-                value = std::array::from_fn(|c| value[c] * response.0[c] as f32);
-                peak *= of_receiver;
-            }
-            let carried = factors[bundle][lane].min(bound / peak as f32);
-            for (sum, &v) in sums.iter_mut().zip(&value) {
-                sum[bundle][lane] += v * carried;
+            let carried = I::Sixteen::load(&factors[bundle]).min(I::Sixteen::splat(bound).div(peak));
+            for c in 0..C {
+                let sum = I::Sixteen::load(&sums[c][bundle]);
+                sum.add(value[c].mul(carried).select(here)).store(&mut sums[c][bundle]);
             }
         }
     }
+}
+
+/// W f of `vertex` with the normal `n` along the unit vectors `w` \[lm/sr\], and the peak of f.
+#[inline(always)]
+fn sent<I: Isa, const C: usize>(
+    scene: &Scene,
+    vertex: &Connector,
+    n: &Triple<I::Sixteen>,
+    w: &Triple<I::Sixteen>,
+) -> ([I::Sixteen; C], I::Sixteen) {
+    let one = I::Sixteen::splat(1.0);
+    let matt = (std::array::from_fn(|c| I::Sixteen::splat(vertex.intensity[c])), one);
+    let Some(glossy) = &vertex.glossy else { return matt };
+    let reflectance = &scene.surface(glossy.primitive).reflectance;
+    let Some(law) = reflectance.lanes() else { return matt };
+    let through = std::array::from_fn(|c| I::Sixteen::splat(glossy.through[c]));
+    let f = law.evaluate::<I::Sixteen, C>(n, (&splat(glossy.from), &through), w);
+    let peak = if reflectance.is_peaked() { weights_over_tolerated(&f) } else { one };
+    (std::array::from_fn(|c| f[c].mul(I::Sixteen::splat(glossy.weight[c]))), peak)
 }

@@ -18,10 +18,23 @@ pub(super) struct Connector {
     pub(super) order: u32,
     /// True where the bound does not apply.
     pub(super) after_delta: bool,
-    /// The vertex itself where the law of reflection depends on direction.
-    pub(super) glossy: Option<Vertex>,
+    /// Where the law of reflection depends on direction.
+    pub(super) glossy: Option<GlossyConnector>,
     /// Number of the emitter of which this is a point and no vertex.
     pub(super) emitter: Option<u32>,
+}
+
+/// What a vertex of a law that depends on direction has besides.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct GlossyConnector {
+    /// The primitive that has the law.
+    pub(super) primitive: u32,
+    /// Unit vector to where the light came from.
+    pub(super) from: Vec3,
+    /// What gets through the specular part from there.
+    pub(super) through: [f32; 3],
+    /// W_n \[lm\].
+    pub(super) weight: [f32; 3],
 }
 
 /// A point of an emitter, as the start of light to many receivers.
@@ -87,15 +100,22 @@ impl Connectors {
 }
 
 fn connector(scene: &Scene, v: &Vertex) -> Connector {
-    let lambert = scene.surface(v.primitive).reflectance.lambert();
+    let reflectance = &scene.surface(v.primitive).reflectance;
+    let lambert = reflectance.lambert();
+    let narrow = |c: Colour| c.0.map(|c| c as f32);
     Connector {
         position: v.position.as_vec3(),
         lifted: scene.geometry.lift(v.position, v.normal).as_vec3(),
         normal: v.normal.as_vec3(),
-        intensity: (v.weight * lambert.unwrap_or(Colour::BLACK) / PI).0.map(|c| c as f32),
+        intensity: narrow(v.weight * lambert.unwrap_or(Colour::BLACK) / PI),
         order: v.order,
         after_delta: v.after_delta,
-        glossy: lambert.is_none().then_some(*v),
+        glossy: lambert.is_none().then(|| GlossyConnector {
+            primitive: v.primitive,
+            from: -v.w_in.as_vec3(),
+            through: narrow(reflectance.through(-v.w_in.dot(v.normal))),
+            weight: narrow(v.weight),
+        }),
         emitter: None,
     }
 }

@@ -50,3 +50,4 @@ pub mod shared;
 mod spherical_triangle;
 mod totals;
 pub mod trajectory;
+mod varying;

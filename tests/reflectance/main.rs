@@ -1,5 +1,6 @@
 //! The metallic-roughness law against integrals of itself: energy, reciprocity, special cases, hard numbers.
 
+mod lanes;
 mod quadrature;
 mod sampling;
 

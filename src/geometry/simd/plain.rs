@@ -76,6 +76,11 @@ impl<const N: usize> Vector for Plain<N> {
     }
 
     #[inline(always)]
+    fn sqrt(self) -> Self {
+        self.zip(self, |a, _| a.sqrt())
+    }
+
+    #[inline(always)]
     fn abs(self) -> Self {
         self.zip(self, |a, _| a.abs())
     }

@@ -38,6 +38,7 @@ impl All {
             a.div(b),
             a.min(b),
             a.max(b),
+            a.sqrt(),
             a.abs(),
             a.flip(b),
             a.select(self.mask),

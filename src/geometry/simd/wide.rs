@@ -70,6 +70,11 @@ impl Vector for Ymm {
     }
 
     #[inline(always)]
+    fn sqrt(self) -> Self {
+        Ymm(unsafe { _mm256_sqrt_ps(self.0) })
+    }
+
+    #[inline(always)]
     fn abs(self) -> Self {
         Ymm(unsafe { _mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0) })
     }
@@ -154,6 +159,11 @@ impl Vector for Zmm {
     #[inline(always)]
     fn mul_sub(self, factor: Self, term: Self) -> Self {
         Zmm(unsafe { _mm512_fmsub_ps(self.0, factor.0, term.0) })
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Zmm(unsafe { _mm512_sqrt_ps(self.0) })
     }
 
     #[inline(always)]
@@ -248,6 +258,11 @@ impl Vector for Pair {
     #[inline(always)]
     fn mul_sub(self, factor: Self, term: Self) -> Self {
         Pair(self.0.mul_sub(factor.0, term.0), self.1.mul_sub(factor.1, term.1))
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Pair(self.0.sqrt(), self.1.sqrt())
     }
 
     #[inline(always)]

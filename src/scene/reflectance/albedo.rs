@@ -17,7 +17,7 @@ use super::microfacet::Microfacets;
 use crate::math::{DVec3, PI, acos, cos, sin_cos};
 
 /// Intervals of the table.
-const INTERVALS: usize = 128;
+pub(super) const INTERVALS: usize = 128;
 /// Points of the Gauss-Legendre rule over the polar angle of the cap.
 const POLAR: usize = 32;
 /// Points of the midpoint rule over half the azimuth (the integrand is even and periodic).
@@ -72,6 +72,11 @@ impl AlbedoTable {
         let i = (t as usize).min(INTERVALS - 1);
         let (p, q, x) = (self.nodes[i], self.nodes[i + 1], t - i as f64);
         Coefficients { a: p.a + (q.a - p.a) * x, b: p.b + (q.b - p.b) * x }
+    }
+
+    /// A and B at all nodes.
+    pub fn nodes(&self) -> &[Coefficients] {
+        &self.nodes
     }
 
     /// 2 int mu dmu of `at`, exactly: 8 int t^7 dt of functions linear in t over each interval.

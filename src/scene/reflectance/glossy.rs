@@ -13,6 +13,7 @@
 //! At alpha below [`MIRROR`] the specular part is a delta component of reflectance F(mu).
 
 use super::albedo::{AlbedoTable, Coefficients};
+use super::lanes::LawInLanes;
 use super::microfacet::{Microfacets, Pair};
 use super::{Scattered, fresnel_rise};
 use crate::math::{DVec3, PI, frame, to_world};
@@ -70,6 +71,7 @@ pub struct Glossy {
     /// `under` / (pi (1 - <a>)).
     diffuse: Colour,
     specular: Specular,
+    lanes: LawInLanes,
     /// Whether connections from it are spiky.
     peaked: bool,
 }
@@ -88,7 +90,11 @@ impl Glossy {
             through if through > 1e-9 => u / (PI * through),
             _ => 0.0,
         });
-        let mut law = Glossy { base, metallic, f0, under, diffuse, specular, peaked: false };
+        let lanes = match &specular {
+            Specular::Mirror => LawInLanes::mirror(f0, diffuse),
+            Specular::Rough(facets, table) => LawInLanes::rough(f0, diffuse, facets.alpha2(), table.nodes()),
+        };
+        let mut law = Glossy { base, metallic, f0, under, diffuse, specular, lanes, peaked: false };
         law.peaked = law.is_peaked_at(super::PEAKED_COSINE);
         law
     }
@@ -104,6 +110,20 @@ impl Glossy {
             Some(pair) => self.finite(&pair, self.specular.albedo(pair.arriving)),
             None => Colour::BLACK,
         }
+    }
+
+    /// The same for many directions at once.
+    pub(super) fn lanes(&self) -> &LawInLanes {
+        &self.lanes
+    }
+
+    /// What the specular part lets through at the cosine `mu`; 0 where there is nothing under it.
+    pub(super) fn through(&self, mu: f64) -> Colour {
+        if self.diffuse.is_black() {
+            return Colour::BLACK;
+        }
+        let specular = self.specular.albedo(mu);
+        self.f0.map(|f0| 1.0 - specular.albedo(f0))
     }
 
     /// f of a pair of directions whose specular albedo at arrival is known \[1/sr\].

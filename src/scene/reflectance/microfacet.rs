@@ -66,7 +66,12 @@ impl Microfacets {
         self.alpha
     }
 
-    /// D / (2 `divisor`), in one division: this is where a connection spends its time.
+    /// Its square.
+    pub fn alpha2(&self) -> f64 {
+        self.alpha2
+    }
+
+    /// D / (2 `divisor`), in one division.
     fn normals_over(&self, pair: &Pair, divisor: f64) -> f64 {
         let d = self.alpha2 * pair.along2 + pair.across2;
         0.5 * self.alpha2 * pair.length2 * pair.length2 / (PI * d * d * divisor)

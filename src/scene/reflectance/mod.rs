@@ -9,12 +9,15 @@
 
 mod albedo;
 mod glossy;
+mod lanes;
 mod microfacet;
 
 use crate::math::{DVec3, PI, to_world};
 use crate::photometry::Colour;
 use crate::random::{Generator, cosine_hemisphere};
 use glossy::Glossy;
+
+pub use lanes::{LawInLanes, weights_over_tolerated};
 
 /// pi f from which on a law counts as peaked: a connection may then weigh this many times one to a white matt surface.
 const PEAK: f64 = 4.0;
@@ -115,6 +118,22 @@ impl Reflectance {
         match self {
             Reflectance::Lambert(rho) => Some(*rho),
             Reflectance::Glossy(_) => None,
+        }
+    }
+
+    /// The law where f depends on the directions, for many of them at once; `None` of Lambert surfaces.
+    pub fn lanes(&self) -> Option<&LawInLanes> {
+        match self {
+            Reflectance::Lambert(_) => None,
+            Reflectance::Glossy(law) => Some(law.lanes()),
+        }
+    }
+
+    /// The share of light that gets through the specular part at the cosine of incidence, where there is something under it.
+    pub fn through(&self, cosine: f64) -> Colour {
+        match self {
+            Reflectance::Lambert(_) => Colour::WHITE,
+            Reflectance::Glossy(law) => law.through(cosine),
         }
     }
 
