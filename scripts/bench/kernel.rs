@@ -17,7 +17,7 @@ use lampyris::geometry::{Geometry, Mesh, Ray, kd_order};
 use lampyris::math::Vec3;
 use lampyris::tally::statistics;
 use segments::{Place, Scene, Segments};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 const RUNS: usize = 7;
 const VERTICES: usize = 8;
@@ -39,9 +39,9 @@ fn bench(scene: Scene) {
     let mut segments = Segments::new(scene, SIDE, VERTICES);
     let places: Vec<_> = segments.receivers.iter().map(|p| p.point.as_dvec3()).collect();
     segments.receivers = kd_order(&places).into_iter().map(|i| segments.receivers[i as usize]).collect();
-    let start = thread_time();
+    let start = Instant::now();
     let mut geometry = Geometry::new(Mesh::new(&segments.triangles), Vec::new(), Vec::new());
-    let built = thread_time() - start;
+    let built = start.elapsed();
     let bytes = geometry.bytes() as f64 / segments.triangles.len() as f64;
     println!(
         "{}: {} triangles, {:.0} bytes each, built in {:.2?}",

@@ -4,12 +4,12 @@
 //! inflated by more than any of their tests rounds, so no test of a box is ever wrong about a triangle inside: answers
 //! come from triangles alone.
 
-use super::pages;
+use super::{binary, pages};
 use crate::math::Vec3;
 use glam::Vec3A;
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
-use obvhs::bvh2::{Bvh2, builder::build_bvh2};
+use obvhs::bvh2::Bvh2;
 use obvhs::ploc::PlocSearchDistance;
 use std::ops::Range;
 
@@ -71,7 +71,7 @@ impl Bvh8 {
             Aabb::new(tight.min - margin, tight.max + margin)
         };
         let boxes: Vec<Aabb> = triangles.iter().map(inflated).collect();
-        let bvh = Collapse::of(&build_bvh2(&boxes, care(triangles.len(), build), &mut Default::default()));
+        let bvh = Collapse::of(&binary::build(&boxes, care(triangles.len(), build)));
         Bvh8 { nodes: pages::collect(bvh.nodes.len(), bvh.nodes.into_iter()), ..bvh }
     }
 

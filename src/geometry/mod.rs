@@ -11,6 +11,7 @@
 
 #![allow(clippy::needless_range_loop, reason = "several arrays go by one axis, lane or channel")]
 
+mod binary;
 mod bvh;
 mod mesh;
 mod ordering;
