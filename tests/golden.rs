@@ -13,7 +13,7 @@ use std::process::Command;
 const GOLDEN: (u32, &str, &str) = (
     4,
     "466fed6f493689e6bff8d32269d9e2eb7c0779caa36a9162724ecf8823659e9a",
-    "950182b49fb7e1be7ecf224a7777eb391727fe4777ee228f7a82b3afeb983a35",
+    "2d914c96357683401b2605cd1d96afb10e118bfda992d2de12d486f3a9f68707",
 );
 
 #[test]
