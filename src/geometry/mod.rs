@@ -13,6 +13,7 @@
 
 mod binary;
 mod bvh;
+pub mod harmonic;
 mod mesh;
 mod ordering;
 mod packet;
@@ -28,6 +29,7 @@ mod sphere;
 pub mod visibility;
 
 pub use bvh::Build;
+pub use harmonic::Harmonic;
 pub use mesh::Mesh;
 pub use ordering::kd_order;
 pub use plane::Plane;
@@ -60,7 +62,7 @@ pub struct Hit {
     pub normal: DVec3,
     /// True when the ray came from the front.
     pub front: bool,
-    /// Triangles first, then spheres, then planes.
+    /// Triangles first, then spheres, then planes, then harmonics.
     pub primitive: u32,
 }
 
@@ -70,6 +72,7 @@ pub struct Geometry {
     mesh: Mesh,
     spheres: Vec<Sphere>,
     planes: Vec<Plane>,
+    harmonics: Vec<Harmonic>,
     /// max |p| + D of the bounded geometry \[m\].
     extent: f64,
 }
@@ -77,14 +80,26 @@ pub struct Geometry {
 impl Geometry {
     /// Joins triangles, spheres and planes; coordinates are re-centred already.
     pub fn new(mesh: Mesh, spheres: Vec<Sphere>, planes: Vec<Plane>) -> Self {
-        let mut bounds = mesh.bounds();
-        for s in &spheres {
-            bounds = union(bounds, (s.center - s.radius, s.center + s.radius));
-        }
-        let (low, high) = bounds;
-        let extent =
+        Geometry { mesh, spheres, planes, ..Geometry::default() }.measured()
+    }
+
+    /// The same geometry and star-shaped objects, re-centred too.
+    pub fn with_harmonics(mut self, harmonics: Vec<Harmonic>) -> Self {
+        self.harmonics = harmonics;
+        self.measured()
+    }
+
+    fn measured(mut self) -> Self {
+        let (low, high) = self.bounds();
+        self.extent =
             if low.x <= high.x { low.abs().max(high.abs()).max_element() + (high - low).length() } else { 1.0 };
-        Geometry { mesh, spheres, planes, extent }
+        self
+    }
+
+    /// Corners of the box around all bounded geometry \[m\].
+    fn bounds(&self) -> (DVec3, DVec3) {
+        let spheres = self.spheres.iter().map(|s| (s.center - s.radius, s.center + s.radius));
+        spheres.chain(self.harmonics.iter().map(Harmonic::bounds)).fold(self.mesh.bounds(), union)
     }
 
     /// Number of triangles.
@@ -109,8 +124,7 @@ impl Geometry {
 
     /// Centre and radius of a sphere around all bounded geometry \[m\].
     pub fn bounding_sphere(&self) -> (DVec3, f64) {
-        let spheres = self.spheres.iter().map(|s| (s.center - s.radius, s.center + s.radius));
-        let (low, high) = spheres.fold(self.mesh.bounds(), union);
+        let (low, high) = self.bounds();
         if low.x > high.x { (DVec3::ZERO, 0.0) } else { (0.5 * (low + high), 0.5 * (high - low).length()) }
     }
 
@@ -122,7 +136,7 @@ impl Geometry {
     /// The same where it is at most `limit` away \[m\], else `None`: the shorter, the faster.
     pub fn closest_hit_within(&self, ray: &Ray, limit: f64) -> Option<Hit> {
         let hit = self.mesh.closest_hit(ray, limit);
-        if self.spheres.is_empty() && self.planes.is_empty() {
+        if !self.has_others() {
             return hit;
         }
         self.closest_of_all(ray, hit).filter(|hit| hit.distance <= limit)
@@ -133,26 +147,31 @@ impl Geometry {
     pub fn closest_hits(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
         assert_eq!(rays.len(), hits.len(), "a hit for each ray");
         self.mesh.closest_hits(rays, hits);
-        if !self.spheres.is_empty() || !self.planes.is_empty() {
+        if self.has_others() {
             for (ray, hit) in rays.iter().zip(hits) {
                 *hit = self.closest_of_all(ray, *hit);
             }
         }
     }
 
+    /// True where there are surfaces beside triangles.
+    fn has_others(&self) -> bool {
+        !self.spheres.is_empty() || !self.planes.is_empty() || !self.harmonics.is_empty()
+    }
+
     /// The first surface along `ray`, which meets the triangles at `best`.
     fn closest_of_all(&self, ray: &Ray, mut best: Option<Hit>) -> Option<Hit> {
         let mut number = self.mesh.len() as u32;
-        let mut offer = |found: Option<Hit>| {
-            if let Some(hit) = found
-                && best.is_none_or(|b| hit.distance < b.distance)
-            {
+        let mut offer = |find: &dyn Fn(f64) -> Option<Hit>| {
+            let limit = best.map_or(f64::INFINITY, |b| b.distance);
+            if let Some(hit) = find(limit).filter(|hit| hit.distance < limit) {
                 best = Some(Hit { primitive: number, ..hit });
             }
             number += 1;
         };
-        self.spheres.iter().for_each(|s| offer(s.hit(ray)));
-        self.planes.iter().for_each(|p| offer(p.hit(ray)));
+        self.spheres.iter().for_each(|s| offer(&|_| s.hit(ray)));
+        self.planes.iter().for_each(|p| offer(&|_| p.hit(ray)));
+        self.harmonics.iter().for_each(|h| offer(&|limit| h.hit(ray, limit)));
         best
     }
 
@@ -176,6 +195,7 @@ impl Geometry {
     pub fn visible(&self, a: Vec3, b: Vec3) -> bool {
         self.planes.iter().all(|p| !p.blocks(a, b))
             && self.spheres.iter().all(|s| !s.blocks(a, b))
+            && self.harmonics.iter().all(|h| !h.blocks(a.as_dvec3(), b.as_dvec3()))
             && !self.mesh.blocks(a, b)
     }
 

@@ -4,7 +4,7 @@
 //! at distance p from the receiver, has G = cos cos'/d^2 = h p/d^4. The answer is conservative: "no" is a proof for
 //! the whole surface, "yes" may be a false alarm. Visibility is not looked at.
 
-use super::{Geometry, Mesh, Plane, Sphere};
+use super::{Geometry, Harmonic, Mesh, Plane, Sphere};
 use crate::math::{DVec3, Vec3};
 
 /// Blocks of triangles that are looked at before the answer is yes: a path from the receiver, which ends at its first point
@@ -21,6 +21,7 @@ impl Geometry {
         let floor = self.lift(position, normal).distance(position);
         self.planes.iter().any(|p| p.may_exceed(position, normal, bound))
             || self.spheres.iter().any(|s| s.may_exceed(position, normal, bound))
+            || self.harmonics.iter().any(|h| h.may_exceed(position, normal, bound))
             || self.mesh.may_exceed(position, normal, bound, floor)
     }
 
@@ -31,8 +32,12 @@ impl Geometry {
             let [a, b, c] = self.triangle(primitive as u32);
             return 0.5 * (b - a).cross(c - a).length();
         }
-        let sphere = self.spheres.get(primitive - self.mesh.len());
-        sphere.map_or(f64::INFINITY, |s| 4.0 * crate::math::PI * s.radius * s.radius)
+        let other = primitive - self.mesh.len();
+        if let Some(sphere) = self.spheres.get(other) {
+            return 4.0 * crate::math::PI * sphere.radius * sphere.radius;
+        }
+        let harmonic = other.checked_sub(self.spheres.len() + self.planes.len()).and_then(|i| self.harmonics.get(i));
+        harmonic.map_or(f64::INFINITY, Harmonic::area)
     }
 }
 

@@ -68,6 +68,14 @@ impl Geometry {
         for (sphere, inside) in self.spheres.iter().zip(&points.inside) {
             shadow_of_sphere(sphere, apex, points, inside, seen);
         }
+        for harmonic in &self.harmonics {
+            for (bundle, seen) in seen.iter_mut().enumerate() {
+                for lane in bits(u32::from(*seen)) {
+                    let blocked = harmonic.blocks(far, points.point(bundle, lane).as_dvec3());
+                    *seen &= !(u16::from(blocked) << lane);
+                }
+            }
+        }
     }
 }
 

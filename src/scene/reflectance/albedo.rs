@@ -14,7 +14,7 @@
 
 use super::fresnel_rise;
 use super::microfacet::Microfacets;
-use crate::math::{DVec3, PI, acos, cos, sin_cos};
+use crate::math::{DVec3, PI, acos, cos, gauss_legendre, sin_cos};
 
 /// Intervals of the table.
 pub(super) const INTERVALS: usize = 128;
@@ -57,7 +57,8 @@ pub(super) struct AlbedoTable {
 impl AlbedoTable {
     /// Integrates the specular part of `facets` at every node.
     pub fn new(facets: &Microfacets) -> Self {
-        let rule = gauss_legendre();
+        // On [0, 1].
+        let rule: Vec<_> = gauss_legendre(POLAR).into_iter().map(|(x, w)| (0.5 * (1.0 + x), 0.5 * w)).collect();
         let azimuths: Vec<f64> = (0..AZIMUTHS).map(|j| cos(PI * (j as f64 + 0.5) / AZIMUTHS as f64)).collect();
         let node = |i: usize| {
             let t = i as f64 / INTERVALS as f64;
@@ -127,38 +128,9 @@ fn integrate(facets: &Microfacets, mu: f64, rule: &[(f64, f64)], azimuths: &[f64
     Coefficients { a: sum.a * scale, b: sum.b * scale }
 }
 
-/// Nodes and weights of the Gauss-Legendre rule on [0, 1], by Newton's method on the Legendre polynomial.
-fn gauss_legendre() -> Vec<(f64, f64)> {
-    let n = POLAR as f64;
-    let node = |i: usize| {
-        let mut x = cos(PI * (i as f64 + 0.75) / (n + 0.5));
-        let mut slope = 1.0;
-        // Quadratic convergence from a guess good to 1e-4: the fourth step changes nothing.
-        for _ in 0..4 {
-            let (mut previous, mut value) = (1.0, x);
-            for k in 2..=POLAR {
-                let k = k as f64;
-                (previous, value) = (value, ((2.0 * k - 1.0) * x * value - (k - 1.0) * previous) / k);
-            }
-            slope = n * (x * value - previous) / (x * x - 1.0);
-            x -= value / slope;
-        }
-        (0.5 * (1.0 + x), 1.0 / ((1.0 - x * x) * slope * slope))
-    };
-    (0..POLAR).map(node).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn gauss_rule_is_exact_for_high_powers() {
-        for power in [0usize, 1, 2, 13, 2 * POLAR - 1] {
-            let sum: f64 = gauss_legendre().iter().map(|&(x, w)| (0..power).fold(w, |p, _| p * x)).sum();
-            assert!((sum * (power + 1) as f64 - 1.0).abs() < 1e-13, "{power}: {sum}");
-        }
-    }
 
     #[test]
     fn mean_is_that_of_the_interpolated_functions() {

@@ -1,0 +1,283 @@
+//! Star-shaped objects: |x| = r(x/|x|) around their centre, r a series of spherical harmonics.
+//!
+//! The surface is exact, and so is its normal n, proportional to r n0 - grad r in the direction n0: nothing is ever made of
+//! triangles but what only rules out or in, beforehand, what needs no look at the series.
+//!
+//! ```text
+//! F(t) = |o + t d| - r((o + t d)/|o + t d|):  positive outside, negative inside, 0 on the surface
+//! F'   = (x,d)/|x| - (grad r, d)/|x|
+//! F(t + s) >= F + F' s - K s^2/2,             K = (M2 + M1)/R^2 where |x| >= R from t to t + s
+//! ```
+//!
+//! with M1 and M2 the bounds of the first and second derivatives of r along great circles: the second derivative of r
+//! along a line is r'' a'^2 + r' a'', with a the angle, a' <= 1/|x| and |a''| <= 1/|x|^2, and |x| itself is convex. So from any
+//! point outside, steps to the zero of that parabola pass no surface, and near a crossing they converge on it as fast as
+//! Newton's. From inside -F is taken, and |x| adds at most 1/R to K.
+
+pub mod file;
+mod series;
+mod shells;
+
+pub use series::{Bounds, MAX_DEGREE, Series, Slope, basis, projection};
+
+use super::{Hit, Ray, hit};
+use crate::error::{Error, Result};
+use crate::math::{DMat3, DVec3, PI};
+use shells::radii;
+
+/// What the sum of a series and its comparison with |x| round, in units of its largest radius.
+const ROUNDING: f64 = 1e-14;
+/// Steps after which a line that only grazes the surface counts as meeting it.
+const MAX_STEPS: usize = 4096;
+
+/// A series as a surface, in its own coordinates.
+#[derive(Clone, Debug)]
+pub struct Star {
+    series: Series,
+    bounds: Bounds,
+    /// No radius is less, none more.
+    radii: (f64, f64),
+}
+
+/// Where a line crosses a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Crossing {
+    /// How far along the line, in units of its direction.
+    pub distance: f64,
+    /// The point, on the surface.
+    pub position: DVec3,
+    /// Outward unit normal.
+    pub normal: DVec3,
+}
+
+/// F and its derivative along a line, and where.
+struct Height {
+    value: f64,
+    rise: f64,
+    slope: Slope,
+    direction: DVec3,
+}
+
+impl Star {
+    /// The surface of `series`.
+    ///
+    /// # Errors
+    /// [`Error::Input`] unless every radius is certainly positive.
+    pub fn new(series: Series) -> Result<Star> {
+        let bounds = series.bounds();
+        let radii = radii(&series, &bounds);
+        if radii.0 <= 0.0 {
+            let allowed = "a radius above 0 in every direction, by the bounds of its derivatives too";
+            return Err(Error::input("series", "least radius", radii.0, allowed));
+        }
+        Ok(Star { series, bounds, radii })
+    }
+
+    /// The series.
+    pub fn series(&self) -> &Series {
+        &self.series
+    }
+
+    /// No radius is less than the first, none more than the second.
+    pub fn radii(&self) -> (f64, f64) {
+        self.radii
+    }
+
+    /// True for points inside.
+    pub fn contains(&self, p: DVec3) -> bool {
+        let length = p.length();
+        length < self.radii.0 || (length < self.radii.1 && length < self.series.value(p / length))
+    }
+
+    /// Outward unit normal in the direction of the unit vector `n0`, and the area of the surface for each unit of solid angle there.
+    pub fn normal_and_area(&self, n0: DVec3) -> (DVec3, f64) {
+        normal_and_area(&self.series.slope(n0), n0)
+    }
+
+    /// The first crossing of the line from `o` along the unit vector `d`, at most `end` away.
+    pub fn first_crossing(&self, o: DVec3, d: DVec3, end: f64) -> Option<Crossing> {
+        let nearest = -o.dot(d);
+        let across2 = (o + nearest * d).length_squared();
+        let (low, high) = self.radii;
+        let reach2 = high * high - across2;
+        if reach2 < 0.0 {
+            return None;
+        }
+        let mut at = (nearest - reach2.sqrt()).max(0.0);
+        let end = end.min(nearest + reach2.sqrt());
+        // The line inside the ball that lies within the surface; empty where it misses that.
+        let half_core = (low * low - across2).max(0.0).sqrt();
+        let core = nearest - half_core..nearest + half_core;
+        let floor = ROUNDING * high;
+        let least = low.max(across2.sqrt());
+        let curvature = (self.bounds.second + self.bounds.first) / (least * least);
+        // Entering the ball around the surface is being outside; else the first look tells.
+        let (mut side, mut height) = (if at > 0.0 { 1.0 } else { 0.0 }, None);
+        for _ in 0..MAX_STEPS {
+            if at > end {
+                return None;
+            }
+            if side <= 0.0 && at > core.start && at < core.end {
+                (side, at) = (-1.0, core.end);
+                continue;
+            }
+            let here = self.height(o + at * d, d);
+            if side == 0.0 {
+                side = if here.value < 0.0 { -1.0 } else { 1.0 };
+                if here.value.abs() <= floor && here.rise * side < 0.0 {
+                    // Starting on the surface and going through it.
+                    side = -side;
+                }
+            }
+            let (value, rise) = (side * here.value, side * here.rise);
+            height = Some((at, here));
+            if value <= floor && (rise <= 0.0 || value < -floor) {
+                break;
+            }
+            let bend = if side > 0.0 { curvature } else { curvature + 1.0 / least };
+            let step = safe_step(value.max(0.0), rise, bend);
+            // From inside the bound holds outside the core only, beyond which all is known.
+            let next = at + step;
+            let next = if side < 0.0 && at < core.start { next.min(core.end) } else { next };
+            if next <= at {
+                break;
+            }
+            at = next;
+        }
+        let (at, height) = height.filter(|(at, _)| *at <= end)?;
+        let (normal, _) = normal_and_area(&height.slope, height.direction);
+        Some(Crossing { distance: at, position: height.slope.value * height.direction, normal })
+    }
+
+    fn height(&self, x: DVec3, d: DVec3) -> Height {
+        let length = x.length();
+        let direction = x / length;
+        let slope = self.series.slope(direction);
+        let rise = direction.dot(d) - slope.gradient.dot(d) / length;
+        Height { value: length - slope.value, rise, slope, direction }
+    }
+
+    /// Volume, by a rule that is exact for r^3.
+    pub fn volume(&self) -> f64 {
+        self.over_the_sphere(|_, n0| {
+            let r = self.series.value(n0);
+            r * r * r / 3.0
+        })
+    }
+
+    /// Area of the surface, to the accuracy of a rule for four times the degree.
+    pub fn area(&self) -> f64 {
+        self.over_the_sphere(|series, n0| normal_and_area(&series.slope(n0), n0).1)
+    }
+
+    /// int f dw.
+    fn over_the_sphere(&self, f: impl Fn(&Series, DVec3) -> f64) -> f64 {
+        let values = |directions: &[DVec3]| Ok(directions.iter().map(|&n0| f(&self.series, n0)).collect::<Vec<f64>>());
+        let mean = projection(0, 2 * self.series.degree() + 16, values);
+        4.0 * PI * mean.map_or(f64::NAN, |mean| mean.value(DVec3::Z))
+    }
+}
+
+/// The largest s with value + rise s - bend s^2/2 >= 0, the value not negative.
+fn safe_step(value: f64, rise: f64, bend: f64) -> f64 {
+    let root = (rise * rise + 2.0 * bend * value).sqrt();
+    if rise > 0.0 { (rise + root) / bend } else { 2.0 * value / (root - rise) }
+}
+
+fn normal_and_area(slope: &Slope, n0: DVec3) -> (DVec3, f64) {
+    let across = slope.value * n0 - slope.gradient;
+    (across.normalize(), slope.value * across.length())
+}
+
+/// A star-shaped object in the world.
+#[derive(Clone, Debug)]
+pub struct Harmonic {
+    star: Star,
+    /// Where its centre stands \[m\].
+    center: DVec3,
+    /// From its coordinates to those of the world, about the centre.
+    to_world: DMat3,
+    to_own: DMat3,
+}
+
+impl Harmonic {
+    /// The object `star` with its centre at `center` \[m\], turned and scaled by `to_world`.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a transform that flattens it.
+    pub fn new(star: Star, center: DVec3, to_world: DMat3) -> Result<Harmonic> {
+        let to_own = to_world.inverse();
+        if !to_own.is_finite() || to_world.determinant() == 0.0 {
+            let allowed = "a transform that flattens nothing";
+            return Err(Error::input("harmonic", "transform", format!("{to_world:?}"), allowed));
+        }
+        Ok(Harmonic { star, center, to_world, to_own })
+    }
+
+    /// The object in its own coordinates.
+    pub fn star(&self) -> &Star {
+        &self.star
+    }
+
+    /// Corners of a box around it \[m\].
+    pub fn bounds(&self) -> (DVec3, DVec3) {
+        let rows = self.to_world.transpose();
+        let half = self.star.radii.1 * DVec3::new(rows.x_axis.length(), rows.y_axis.length(), rows.z_axis.length());
+        (self.center - half, self.center + half)
+    }
+
+    /// The same object elsewhere.
+    pub fn moved(mut self, by: DVec3) -> Self {
+        self.center += by;
+        self
+    }
+
+    /// True for points inside \[m\].
+    pub fn contains(&self, p: DVec3) -> bool {
+        self.star.contains(self.to_own * (p - self.center))
+    }
+
+    /// The point of the surface in the direction `n0` of its own coordinates \[m\], its outward normal, and the area for each unit of solid angle
+    /// there \[m2/sr\].
+    pub fn point(&self, n0: DVec3) -> (DVec3, DVec3, f64) {
+        let slope = self.star.series.slope(n0);
+        let (normal, area) = normal_and_area(&slope, n0);
+        let turned = self.to_own.transpose() * normal;
+        let stretch = turned.length();
+        let position = self.center + self.to_world * (slope.value * n0);
+        (position, turned / stretch, area * self.to_world.determinant().abs() * stretch)
+    }
+
+    /// Area of the surface \[m2\].
+    pub fn area(&self) -> f64 {
+        self.star.over_the_sphere(|_, n0| self.point(n0).2)
+    }
+
+    /// True unless no point of it above the tangent plane of `position` with the unit vector `normal` can have a geometric factor
+    /// above `bound` \[1/m2\]: what is too far, or all below, has none.
+    pub(super) fn may_exceed(&self, position: DVec3, normal: DVec3, bound: f64) -> bool {
+        let (low, high) = self.bounds();
+        let nearest = position.clamp(low, high);
+        let highest = DVec3::select(normal.cmpgt(DVec3::ZERO), high, low);
+        (nearest - position).length_squared() * bound < 1.0 && (highest - position).dot(normal) > 0.0
+    }
+
+    /// The first point of the surface along `ray`, at most `limit` away \[m\].
+    pub(super) fn hit(&self, ray: &Ray, limit: f64) -> Option<Hit> {
+        let direction = self.to_own * ray.direction;
+        let scale = direction.length();
+        let origin = self.to_own * (ray.origin - self.center);
+        let crossing = self.star.first_crossing(origin, direction / scale, limit * scale)?;
+        let normal = (self.to_own.transpose() * crossing.normal).normalize();
+        let position = self.center + self.to_world * crossing.position;
+        Some(hit(ray, crossing.distance / scale, position, normal))
+    }
+
+    /// True when the segment between `a` and `b` crosses the surface \[m\].
+    pub(super) fn blocks(&self, a: DVec3, b: DVec3) -> bool {
+        let (from, to) = (self.to_own * (a - self.center), self.to_own * (b - self.center));
+        let along = to - from;
+        let length = along.length();
+        length > 0.0 && self.star.first_crossing(from, along / length, length).is_some()
+    }
+}

@@ -1,0 +1,280 @@
+//! Series of real spherical harmonics on the unit sphere, and what their coefficients alone bound.
+//!
+//! Schmidt semi-normalised functions with sqrt(2) for m > 0 and without the Condon-Shortley sign:
+//!
+//! ```text
+//! S_k^m(theta) = sqrt(2 - delta_m0) sqrt((k-m)!/(k+m)!) sin^m d^m P_k/dz^m,   z = cos theta
+//! r(n)         = sum over k = 0..N, m = 0..k of (c_km cos m phi + s_km sin m phi) S_k^m
+//! norm^2       = 4 pi/(2k+1) of every function;   the sum over m of their squares is 1 at every point
+//! ```
+//!
+//! With H_k^m(z) = S_k^m/sin^m, which obeys a recurrence over k without factorials, and (x + i y)^m = C_m + i D_m nothing
+//! is singular at the poles, and no trigonometric function is needed:
+//!
+//! ```text
+//! r = sum_m (A_m C_m + B_m D_m),   A_m = sum_k c_km H_k^m(z),   B_m = sum_k s_km H_k^m(z)
+//! g = (sum m (A_m C_(m-1) + B_m D_(m-1)),  sum m (B_m C_(m-1) - A_m D_(m-1)),  sum (A'_m C_m + B'_m D_m))
+//! ```
+//!
+//! In the recurrence stands z^2 + (x^2 + y^2) where it could be 1: what rounding leaves of a unit vector would count k^2 times
+//! near the poles else, and k times so.
+//! The gradient on the sphere is g - (g,n) n. The functions are those of the paper's (18) times sqrt(2) (-1)^m, m > 0.
+
+use crate::error::{Error, Result};
+use crate::math::{DVec3, PI, gauss_legendre, sin_cos};
+
+/// The largest degree N.
+pub const MAX_DEGREE: usize = 128;
+
+/// A real function on the unit sphere as a sum of spherical harmonics up to a degree.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Series {
+    degree: usize,
+    /// Orders one after the other, degrees k = m ..= N in each.
+    terms: Vec<Term>,
+}
+
+/// A pair of coefficients and the recurrence that leads to its function.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Term {
+    cosine: f64,
+    sine: f64,
+    /// H_k = `ahead` z H_(k-1) - `behind` H_(k-2); `ahead` of k = m is H_m^m itself.
+    ahead: f64,
+    behind: f64,
+}
+
+/// Value and gradient in a direction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Slope {
+    /// r(n).
+    pub value: f64,
+    /// The gradient of r on the sphere, orthogonal to n \[unit of r per rad\].
+    pub gradient: DVec3,
+}
+
+/// Coefficients of degree k and order m stand at `index(k, m)`: degree after degree, orders in each.
+fn index(k: usize, m: usize) -> usize {
+    k * (k + 1) / 2 + m
+}
+
+impl Series {
+    /// The series with the pairs c_km, s_km, degree after degree, orders m = 0 ..= k in each.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a number of pairs that no degree up to [`MAX_DEGREE`] has, an s_k0 that is not 0, or a number
+    /// that is not finite.
+    pub fn new(pairs: &[[f64; 2]]) -> Result<Series> {
+        let degree = (0..=MAX_DEGREE).find(|&n| index(n + 1, 0) == pairs.len()).ok_or_else(|| {
+            let allowed = format!("(N + 1)(N + 2)/2 of them, N from 0 to {MAX_DEGREE}");
+            Error::input("series", "pairs of coefficients", pairs.len(), allowed)
+        })?;
+        if let Some(wrong) = pairs.iter().flatten().find(|c| !c.is_finite()) {
+            return Err(Error::input("series", "coefficient", wrong, "finite numbers"));
+        }
+        if let Some(k) = (0..=degree).find(|&k| pairs[index(k, 0)][1] != 0.0) {
+            return Err(Error::input("series", format!("s of degree {k}, order 0"), pairs[index(k, 0)][1], "0"));
+        }
+        let mut terms = Vec::with_capacity(pairs.len());
+        let mut first = 1.0;
+        for m in 0..=degree {
+            // sqrt(2) of m > 0 comes in at m = 1, where sqrt((2m - 1)/(2m)) is sqrt(1/2).
+            first *= if m >= 2 { ((2 * m - 1) as f64 / (2 * m) as f64).sqrt() } else { 1.0 };
+            for k in m..=degree {
+                let [cosine, sine] = pairs[index(k, m)];
+                let below = ((k * k - m * m) as f64).sqrt();
+                let (ahead, behind) = match k - m {
+                    0 => (first, 0.0),
+                    1 => ((2 * k - 1) as f64 / below, 0.0),
+                    _ => ((2 * k - 1) as f64 / below, (((k - 1) * (k - 1) - m * m) as f64).sqrt() / below),
+                };
+                terms.push(Term { cosine, sine, ahead, behind });
+            }
+        }
+        Ok(Series { degree, terms })
+    }
+
+    /// The constant function.
+    pub fn constant(value: f64) -> Series {
+        Series::new(&[[value, 0.0]]).expect("one finite coefficient")
+    }
+
+    /// N.
+    pub fn degree(&self) -> usize {
+        self.degree
+    }
+
+    /// The pairs c_km, s_km, degree after degree, orders m = 0 ..= k in each.
+    pub fn pairs(&self) -> Vec<[f64; 2]> {
+        let mut pairs = vec![[0.0; 2]; self.terms.len()];
+        self.for_each(|k, m, term| pairs[index(k, m)] = [term.cosine, term.sine]);
+        pairs
+    }
+
+    /// The same series up to `degree`, if it goes farther.
+    pub fn truncated(&self, degree: usize) -> Series {
+        let degree = degree.min(self.degree);
+        Series::new(&self.pairs()[..index(degree + 1, 0)]).expect("coefficients of a series")
+    }
+
+    fn for_each(&self, mut f: impl FnMut(usize, usize, &Term)) {
+        let mut terms = self.terms.iter();
+        for m in 0..=self.degree {
+            for (k, term) in (m..=self.degree).zip(terms.by_ref()) {
+                f(k, m, term);
+            }
+        }
+    }
+
+    /// r in the direction of the unit vector `n`.
+    pub fn value(&self, n: DVec3) -> f64 {
+        let (mut value, mut rest) = (0.0, &self.terms[..]);
+        let (mut re, mut im) = (1.0, 0.0);
+        let across2 = n.x * n.x + n.y * n.y;
+        for m in 0..=self.degree {
+            let (of_order, others) = rest.split_at(self.degree + 1 - m);
+            rest = others;
+            let (mut h, mut previous) = (of_order[0].ahead, 0.0);
+            let (mut a, mut b) = (of_order[0].cosine * h, of_order[0].sine * h);
+            for term in &of_order[1..] {
+                let next = n.z * (term.ahead * h - term.behind * (n.z * previous)) - term.behind * (across2 * previous);
+                (previous, h) = (h, next);
+                a += term.cosine * h;
+                b += term.sine * h;
+            }
+            value += a * re + b * im;
+            (re, im) = (re * n.x - im * n.y, re * n.y + im * n.x);
+        }
+        value
+    }
+
+    /// r and its gradient in the direction of the unit vector `n`.
+    pub fn slope(&self, n: DVec3) -> Slope {
+        let (mut value, mut g, mut rest) = (0.0, DVec3::ZERO, &self.terms[..]);
+        let (mut re, mut im, mut re_before, mut im_before) = (1.0, 0.0, 0.0, 0.0);
+        let across2 = n.x * n.x + n.y * n.y;
+        for m in 0..=self.degree {
+            let (of_order, others) = rest.split_at(self.degree + 1 - m);
+            rest = others;
+            let (mut h, mut previous) = (of_order[0].ahead, 0.0);
+            let (mut dh, mut previous_dh) = (0.0, 0.0);
+            let (mut a, mut b) = (of_order[0].cosine * h, of_order[0].sine * h);
+            let (mut da, mut db) = (0.0, 0.0);
+            for term in &of_order[1..] {
+                let next = n.z * (term.ahead * h - term.behind * (n.z * previous)) - term.behind * (across2 * previous);
+                let next_dh = term.ahead * (h + n.z * dh) - term.behind * previous_dh;
+                (previous, h) = (h, next);
+                (previous_dh, dh) = (dh, next_dh);
+                a += term.cosine * h;
+                b += term.sine * h;
+                da += term.cosine * dh;
+                db += term.sine * dh;
+            }
+            let order = m as f64;
+            value += a * re + b * im;
+            g.x += order * (a * re_before + b * im_before);
+            g.y += order * (b * re_before - a * im_before);
+            g.z += da * re + db * im;
+            (re_before, im_before) = (re, im);
+            (re, im) = (re * n.x - im * n.y, re * n.y + im * n.x);
+        }
+        Slope { value, gradient: g - g.dot(n) * n }
+    }
+
+    /// The norm |c_k| of the coefficients of each degree: sqrt(sum over m of c^2 + s^2), which bounds that part of r everywhere.
+    pub fn norms(&self) -> Vec<f64> {
+        let mut squares = vec![0.0; self.degree + 1];
+        self.for_each(|k, _, term| squares[k] += term.cosine * term.cosine + term.sine * term.sine);
+        squares.into_iter().map(f64::sqrt).collect()
+    }
+
+    /// The bounds of r and its derivatives along great circles.
+    pub fn bounds(&self) -> Bounds {
+        let norms = self.norms();
+        let sum = |of: fn(f64) -> f64| norms.iter().enumerate().skip(1).map(|(k, c)| of(k as f64) * c).sum::<f64>();
+        let (middle, around) = (self.terms[0].cosine * self.terms[0].ahead, sum(|_| 1.0));
+        Bounds {
+            low: middle - around,
+            high: middle + around,
+            first: sum(|k| (0.5 * k * (k + 1.0)).sqrt()),
+            second: sum(|k| k * k),
+            fourth: sum(|k| k * k * k * k),
+        }
+    }
+}
+
+/// What r and its derivatives along any great circle, by the angle, do not exceed; from |c_k| alone, so never too little and
+/// often too much.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// r is nowhere less.
+    pub low: f64,
+    /// r is nowhere more.
+    pub high: f64,
+    /// Magnitude of the gradient.
+    pub first: f64,
+    /// Magnitude of the second derivative.
+    pub second: f64,
+    /// Magnitude of the fourth derivative.
+    pub fourth: f64,
+}
+
+/// All functions up to `degree` in the direction of the unit vector `n`: the pairs S_k^m cos m phi, S_k^m sin m phi, degree
+/// after degree, orders m = 0 ..= k in each.
+pub fn basis(degree: usize, n: DVec3) -> Vec<[f64; 2]> {
+    let unit = Series::new(&vec![[0.0; 2]; index(degree + 1, 0)]).expect("zeros up to a degree");
+    let mut functions = vec![[0.0; 2]; unit.terms.len()];
+    let (mut re, mut im) = (1.0, 0.0);
+    let (mut h, mut previous) = (0.0, 0.0);
+    let across2 = n.x * n.x + n.y * n.y;
+    unit.for_each(|k, m, term| {
+        if k == m {
+            if m > 0 {
+                (re, im) = (re * n.x - im * n.y, re * n.y + im * n.x);
+            }
+            (h, previous) = (term.ahead, 0.0);
+        } else {
+            let next = n.z * (term.ahead * h - term.behind * (n.z * previous)) - term.behind * (across2 * previous);
+            (h, previous) = (next, h);
+        }
+        functions[index(k, m)] = [h * re, h * im];
+    });
+    functions
+}
+
+/// The coefficients of a function of direction: c_km = (2k+1)/(4 pi) int r S_k^m cos m phi dw, s_km with sin.
+///
+/// Gauss-Legendre in z with `nodes` nodes and twice as many equal steps of the azimuth; `of` is given all directions at once.
+/// Exact for series up to degree `nodes` - 1 - `degree`/2; 2(N + 1) nodes remove aliasing.
+///
+/// # Errors
+/// Those of `of`, and of [`Series::new`] for values that are not finite.
+pub fn projection(degree: usize, nodes: usize, of: impl FnOnce(&[DVec3]) -> Result<Vec<f64>>) -> Result<Series> {
+    let rule = gauss_legendre(nodes);
+    let steps = 2 * nodes;
+    let mut directions = Vec::with_capacity(nodes * steps);
+    for &(z, _) in &rule {
+        let across = (1.0 - z * z).max(0.0).sqrt();
+        directions.extend((0..steps).map(|j| {
+            let (sin, cos) = sin_cos(2.0 * PI * (j as f64 + 0.5) / steps as f64);
+            DVec3::new(across * cos, across * sin, z)
+        }));
+    }
+    let values = of(&directions)?;
+    let mut pairs = vec![[0.0; 2]; index(degree + 1, 0)];
+    for (i, (&n, value)) in directions.iter().zip(values).enumerate() {
+        // 4 pi is the sum of the weights: 2 of the rule, 2 pi of the azimuth.
+        let weight = value * rule[i / steps].1 * 0.5 / steps as f64;
+        for (pair, function) in pairs.iter_mut().zip(basis(degree, n)) {
+            pair[0] += weight * function[0];
+            pair[1] += weight * function[1];
+        }
+    }
+    for k in 0..=degree {
+        for m in 0..=k {
+            pairs[index(k, m)] = pairs[index(k, m)].map(|c| c * (2 * k + 1) as f64);
+        }
+        pairs[index(k, 0)][1] = 0.0;
+    }
+    Series::new(&pairs)
+}
