@@ -22,7 +22,7 @@ const LAYERS: [&[&str]; 9] = [
 const FARM: [&[&str]; 9] = [
     &["plan", "durable"],
     &["receivers", "thinning"],
-    &["regions"],
+    &["regions", "degree"],
     &["local"],
     &["folder", "realization", "pilot"],
     &["inputs", "checkpoint"],

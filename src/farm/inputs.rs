@@ -1,6 +1,7 @@
 //! Files -> plan and scene: a job file beside its inputs becomes a plan with every input known by content, and a
 //! planned folder becomes the scene again, from the copies it keeps.
 
+use super::degree;
 use super::folder::Folder;
 use super::pilot::bounds;
 use super::plan::{Input, Plan, SceneSummary};
@@ -8,7 +9,9 @@ use super::receivers::ReceiverSet;
 use super::regions::Regions;
 use crate::error::{Error, Result};
 use crate::geometry::Build;
-use crate::job::Job;
+use crate::geometry::harmonic::MAX_DEGREE;
+use crate::geometry::harmonic::file::File;
+use crate::job::{Degree, Job};
 use crate::scene::{Model, Scene, gltf};
 use std::fs;
 use std::path::{Component, Path};
@@ -30,14 +33,21 @@ pub fn prepare(path: &Path) -> Result<Prepared> {
     let file = path.display().to_string();
     let bytes = fs::read(path).map_err(|e| Error::input("command line", "JOB", &file, format!("a job file ({e})")))?;
     let text = String::from_utf8(bytes).map_err(|_| Error::input(&file, "(encoding)", "not UTF-8", "UTF-8 text"))?;
-    let job = Job::parse(&text, &file)?;
+    let mut job = Job::parse(&text, &file)?;
     let mut files = Vec::new();
     let model = match &job.scene {
         Some(name) => read_model(path, name, &mut files)?,
         None => Model::default(),
     };
+    let series = job.replacements.iter().enumerate().map(|(i, r)| read_series(path, i, &r.harmonic, &mut files));
+    let series: Vec<File> = series.collect::<Result<_>>()?;
+    let kept = degree::is_open(&job).then(|| model.clone());
     // Planning asks few rays (one a pixel where a region names a node), and each worker builds the scene again.
-    let scene = Scene::built(model, &job, Build::Quick)?;
+    let mut scene = Scene::built(replaced(model, &job, &file, &series)?, &job, Build::Quick)?;
+    if let Some(model) = kept {
+        degree::fix(&mut job, &scene);
+        scene = Scene::built(replaced(model, &job, &file, &series)?, &job, Build::Quick)?;
+    }
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let job_file = Input::of(&file_name(path), text.as_bytes());
     let inputs = files.iter().map(|(input, _): &(Input, Vec<u8>)| input.clone()).collect();
@@ -57,14 +67,45 @@ pub fn prepare(path: &Path) -> Result<Prepared> {
 /// # Errors
 /// [`Error::Refused`] for a copy that is damaged; [`Error::Input`] for a scene that asks for a file not planned.
 pub fn load_scene(folder: &Folder, plan: &Plan) -> Result<Scene> {
-    let Some((first, others)) = plan.inputs.split_first() else { return Scene::new(Model::default(), &plan.job) };
+    let of_scene = plan.inputs.len().checked_sub(plan.job.replacements.len());
+    let Some((of_scene, of_series)) = of_scene.map(|count| plan.inputs.split_at(count)) else {
+        return Err(Error::input("plan", "inputs", plan.inputs.len(), "a file for each [[replace]]"));
+    };
+    let Some((first, others)) = of_scene.split_first() else { return Scene::new(Model::default(), &plan.job) };
     let bytes = folder.read_input(first)?;
     let mut fetch = |uri: &str| match others.iter().find(|i| i.name == uri) {
         Some(input) => folder.read_input(input),
         None => Err(Error::input(&first.name, "uri", uri, "a file known to the plan")),
     };
     let model = gltf::load(&first.name, &bytes, &mut fetch)?;
-    Scene::new(model, &plan.job)
+    let series = of_series.iter().map(|input| File::parse(&input.name, &folder.read_input(input)?));
+    let series: Vec<File> = series.collect::<Result<_>>()?;
+    Scene::new(replaced(model, &plan.job, "plan", &series)?, &plan.job)
+}
+
+/// `model` with the `series` of `job` in the place of the meshes that it names.
+fn replaced(mut model: Model, job: &Job, file: &str, series: &[File]) -> Result<Model> {
+    for (i, (replacement, whole)) in job.replacements.iter().zip(series).enumerate() {
+        let degree = match replacement.degree {
+            Some(Degree::Number(degree)) => degree as usize,
+            Some(Degree::Word(_)) | None => MAX_DEGREE,
+        };
+        let truncated = File { series: whole.series.truncated(degree), ..whole.clone() };
+        model.replace((file, &format!("replace[{i}]")), &replacement.node, truncated)?;
+    }
+    Ok(model)
+}
+
+/// Reads the file `name` of the series of `[[replace]]` number `i` of the job at `job_path`, and adds it to `files`.
+fn read_series(job_path: &Path, i: usize, name: &str, files: &mut Vec<(Input, Vec<u8>)>) -> Result<File> {
+    let path = job_path.parent().unwrap_or(Path::new("")).join(name);
+    let bytes = fs::read(&path).map_err(|e| {
+        let allowed = format!("a .harmonic file, relative to the job file ({e})");
+        Error::input(job_path.display(), format!("replace[{i}].harmonic"), name, allowed)
+    })?;
+    let file = File::parse(name, &bytes)?;
+    files.push((Input::of(name, &bytes), bytes));
+    Ok(file)
 }
 
 /// Loads the scene file `name` of the job at `job_path`; every file read is added to `files`, the scene first.

@@ -21,6 +21,7 @@
 
 pub mod checkpoint;
 pub mod coordinator;
+mod degree;
 pub mod durable;
 pub mod folder;
 pub mod inputs;

@@ -226,6 +226,20 @@ impl Harmonic {
         (self.center - half, self.center + half)
     }
 
+    /// Its centre, the radius of a ball about that around it \[m\], and how much longer it is here than in its own coordinates, at most.
+    pub fn around(&self) -> (DVec3, f64, f64) {
+        // No direction is stretched by more than the root of the sum of squares of a matrix.
+        let columns = [self.to_world.x_axis, self.to_world.y_axis, self.to_world.z_axis];
+        let whole = columns.iter().map(|c| c.length_squared()).sum::<f64>().sqrt();
+        // A turned and evenly scaled object, as most are, is stretched by the length of any column.
+        let even = columns.iter().map(|c| c.length()).fold(0.0, f64::max);
+        let product = self.to_world.transpose() * self.to_world;
+        let off = product - DMat3::from_diagonal(DVec3::splat(even * even));
+        let is_even = off.to_cols_array().iter().all(|x| x.abs() <= 1e-12 * even * even);
+        let stretch = if is_even { even } else { whole };
+        (self.center, stretch * self.star.radii.1, stretch)
+    }
+
     /// The same object elsewhere.
     pub fn moved(mut self, by: DVec3) -> Self {
         self.center += by;

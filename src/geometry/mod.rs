@@ -117,6 +117,11 @@ impl Geometry {
         self.mesh.triangle(primitive)
     }
 
+    /// The star-shaped objects.
+    pub fn harmonics(&self) -> &[Harmonic] {
+        &self.harmonics
+    }
+
     /// True when there are surfaces without bounds.
     pub fn is_unbounded(&self) -> bool {
         !self.planes.is_empty()

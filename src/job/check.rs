@@ -1,6 +1,9 @@
 //! Every check on what a user typed: each refusal names the field, the value and what is allowed.
 
-use super::{Camera, Estimator, Gonio, Grid, Job, Kept, Ratio, ReceiverKind, Region, Roulette, Sampling, Source, Stop};
+use super::{
+    Camera, Degree, DegreeWord, Estimator, Gonio, Grid, Job, Kept, Ratio, ReceiverKind, Region, Replacement, Roulette,
+    Sampling, Source, Stop,
+};
 use crate::error::{Error, Result};
 use std::collections::HashSet;
 use std::fmt::Debug;
@@ -13,6 +16,8 @@ const MAX_TRAJECTORIES: u64 = 1 << 20;
 const MAX_METRES: f64 = 1e6;
 /// Fewest batches of quasi-random sets: only batches tell the error, and fewer tell it badly.
 const MIN_RQMC_BATCHES: u64 = 16;
+/// Largest degree of a series, as of its files.
+const MAX_DEGREE: u64 = 128;
 /// Most bins of one set that are watched history by history.
 const MAX_MONITORED: usize = 1024;
 
@@ -273,6 +278,9 @@ fn check_surfaces(c: &Checker, job: &Job) -> Result<()> {
         let radius = sphere.radius;
         c.that(&format!("sphere[{i}].radius"), radius, radius > 0.0 && radius <= MAX_METRES, "above 0, at most 1e6")?;
     }
+    for (i, replacement) in job.replacements.iter().enumerate() {
+        check_replacement(c, &format!("replace[{i}]"), replacement, job)?;
+    }
     for (i, Source::Omni { position, intensity }) in job.sources.iter().enumerate() {
         c.position(&format!("source[{i}].position"), *position)?;
         let fits = *intensity > 0.0 && *intensity <= 1e12;
@@ -280,6 +288,21 @@ fn check_surfaces(c: &Checker, job: &Job) -> Result<()> {
     }
     let lit = job.scene.is_some() || !job.sources.is_empty();
     c.that("scene", "(missing)", lit, "a scene file, or planes, spheres and at least one [[source]]")
+}
+
+fn check_replacement(c: &Checker, at: &str, replacement: &Replacement, job: &Job) -> Result<()> {
+    c.that(&format!("{at}.node"), &replacement.node, job.scene.is_some(), "a node only with a scene")?;
+    let twice = job.replacements.iter().filter(|other| other.node == replacement.node).count() > 1;
+    c.that(&format!("{at}.node"), &replacement.node, !twice, "each node once")?;
+    if let Some(Degree::Number(degree)) = replacement.degree {
+        c.range(&format!("{at}.degree"), degree.into(), 0, MAX_DEGREE)?;
+    }
+    let auto = matches!(replacement.degree, Some(Degree::Word(DegreeWord::Auto)));
+    let error = replacement.error_pixels;
+    let fits = error.is_none_or(|e| auto && e > 0.0 && e <= 100.0);
+    let shown = error.unwrap_or_default();
+    c.that(&format!("{at}.error_pixels"), shown, fits, "above 0, at most 100, and only with degree = \"auto\"")?;
+    c.that(&format!("{at}.degree"), "auto", !auto || !job.cameras.is_empty(), "a number where there is no [[camera]]")
 }
 
 struct Checker<'a> {

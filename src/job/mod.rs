@@ -5,8 +5,10 @@
 
 mod check;
 mod receivers;
+mod replacement;
 
 pub use receivers::{Camera, Gonio, Grid, Kept, Point, ReceiverKind, Region, SetShape, View};
+pub use replacement::{Degree, DegreeWord, Replacement};
 
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -52,6 +54,9 @@ pub struct Job {
     /// Analytic Lambert spheres.
     #[serde(default, rename = "sphere", skip_serializing_if = "Vec::is_empty")]
     pub spheres: Vec<Sphere>,
+    /// Series of spherical harmonics in the place of meshes.
+    #[serde(default, rename = "replace", skip_serializing_if = "Vec::is_empty")]
+    pub replacements: Vec<Replacement>,
     /// Light sources beside those of the scene file.
     #[serde(default, rename = "source", skip_serializing_if = "Vec::is_empty")]
     pub sources: Vec<Source>,

@@ -7,6 +7,7 @@
 pub mod gltf;
 mod nodes;
 mod reflectance;
+mod replace;
 mod source;
 
 pub use nodes::{Node, Nodes};
@@ -14,7 +15,7 @@ pub use reflectance::{LawInLanes, Reflectance, Scattered, weight_over_tolerated,
 pub use source::{Emission, Emitter, Light, Sources};
 
 use crate::error::{Error, Result};
-use crate::geometry::{Build, Geometry, Hit, Mesh, Plane, Sphere};
+use crate::geometry::{Build, Geometry, Harmonic, Hit, Mesh, Plane, Sphere};
 use crate::job::{self, Channels, Job};
 use crate::math::DVec3;
 use crate::photometry::Colour;
@@ -69,8 +70,21 @@ pub struct Model {
     pub lights: Vec<Light>,
     /// Cameras.
     pub cameras: Vec<CameraNode>,
+    /// Star-shaped objects in the place of meshes.
+    pub replacements: Vec<Replaced>,
     /// What was ignored or replaced, each with its effect.
     pub warnings: Vec<String>,
+}
+
+/// A star-shaped object in the place of the mesh of a node.
+#[derive(Clone, Debug)]
+pub struct Replaced {
+    /// The object, in world coordinates.
+    pub harmonic: Harmonic,
+    /// Its surface, an index into `surfaces`.
+    pub surface: u32,
+    /// The node, a place in the list of nodes.
+    pub node: u32,
 }
 
 /// A model ready for transport, in re-centred coordinates.
@@ -108,7 +122,7 @@ impl Scene {
     /// # Errors
     /// As [`Scene::new`].
     pub fn built(model: Model, job: &Job, build: Build) -> Result<Scene> {
-        let offset = -middle(&model.positions, &job.spheres);
+        let offset = -middle(&model, &job.spheres);
         let paint = |c: Colour| match job.run.channels {
             Channels::Luminance => Colour::grey(c.luminance()),
             Channels::Rgb => c,
@@ -117,12 +131,16 @@ impl Scene {
         let mesh = Mesh::built(&corners.collect::<Vec<_>>(), build);
         let mut surfaces: Vec<Surface> = model.surfaces.into_iter().map(|s| painted(s, job.run.channels)).collect();
         let mut surface_of = model.surface_of;
-        let geometry = Geometry::new(mesh, spheres(job, offset), planes(job, offset));
+        let harmonics = model.replacements.iter().map(|r| r.harmonic.clone().moved(offset)).collect();
+        let geometry = Geometry::new(mesh, spheres(job, offset), planes(job, offset)).with_harmonics(harmonics);
         let shares = job.spheres.iter().map(|s| s.reflectance).chain(job.planes.iter().map(|p| p.reflectance));
         for share in shares {
             surface_of.push(surfaces.len() as u32);
             surfaces.push(analytic_surface(share));
         }
+        let mut nodes = model.nodes;
+        nodes.of_replacements = (surface_of.len() as u32, model.replacements.iter().map(|r| r.node).collect());
+        surface_of.extend(model.replacements.iter().map(|r| r.surface));
         let emitters = emitters(&geometry, &surfaces, &surface_of);
         let lights = model.lights.into_iter().chain(job.sources.iter().map(light));
         let lights: Vec<Light> = lights.map(|l| l.moved(offset).recoloured(paint)).collect();
@@ -152,7 +170,7 @@ impl Scene {
             geometry,
             sources,
             cameras,
-            nodes: model.nodes,
+            nodes,
             warnings,
             offset,
             surfaces,
@@ -218,10 +236,17 @@ impl Scene {
 }
 
 /// Middle of the box around all bounded geometry; the origin without any.
-fn middle(positions: &[DVec3], spheres: &[job::Sphere]) -> DVec3 {
+fn middle(model: &Model, spheres: &[job::Sphere]) -> DVec3 {
+    let boxes = model.replacements.iter().map(|r| r.harmonic.bounds()).flat_map(|(low, high)| [low, high]);
     let poles = spheres.iter().flat_map(|s| [DVec3::from(s.center) - s.radius, DVec3::from(s.center) + s.radius]);
     let empty = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    let (low, high) = positions.iter().copied().chain(poles).fold(empty, |(low, high), p| (low.min(p), high.max(p)));
+    let (low, high) = model
+        .positions
+        .iter()
+        .copied()
+        .chain(poles)
+        .chain(boxes)
+        .fold(empty, |(low, high), p| (low.min(p), high.max(p)));
     if low.x <= high.x { 0.5 * (low + high) } else { DVec3::ZERO }
 }
 

@@ -3,8 +3,10 @@
 //! A part of a scene is known to its user by the name of a node; it is everything that hangs at that node or below.
 //! Four bytes a triangle and the names are all that is kept of the hierarchy once transforms are baked in.
 
+use crate::math::DMat4;
+
 /// A node of the scene.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Node {
     /// Its number in the file.
     pub index: usize,
@@ -12,15 +14,19 @@ pub struct Node {
     pub name: Option<String>,
     /// The node that it hangs at, as a place in [`Nodes::list`] before its own.
     pub parent: Option<u32>,
+    /// From its coordinates to those of the world.
+    pub world: DMat4,
 }
 
 /// All nodes, and the node of each triangle.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Nodes {
     /// Parents before children.
     pub list: Vec<Node>,
     /// Of each triangle its node, a place in `list`; empty for a model that knows no nodes.
     pub of_triangle: Vec<u32>,
+    /// The first surface that is a replacement of a node's mesh, and the nodes of all of them.
+    pub of_replacements: (u32, Vec<u32>),
 }
 
 impl Nodes {
@@ -32,7 +38,9 @@ impl Nodes {
 
     /// The node of the surface `primitive`; `None` for what comes from no scene file.
     pub fn of(&self, primitive: u32) -> Option<usize> {
-        self.of_triangle.get(primitive as usize).map(|&place| place as usize)
+        let (first, replacements) = &self.of_replacements;
+        let replacement = || replacements.get(primitive.checked_sub(*first)? as usize);
+        self.of_triangle.get(primitive as usize).or_else(replacement).map(|&place| place as usize)
     }
 
     /// Of each node whether it is the one at `place` or hangs below it.
@@ -47,7 +55,8 @@ impl Nodes {
     /// Names of the nodes at which, or below which, there are triangles.
     pub fn names_with_surface(&self) -> Vec<&str> {
         let mut shown = vec![false; self.list.len()];
-        self.of_triangle.iter().for_each(|&place| shown[place as usize] = true);
+        let places = self.of_triangle.iter().chain(&self.of_replacements.1);
+        places.for_each(|&place| shown[place as usize] = true);
         for (i, node) in self.list.iter().enumerate().rev() {
             if let (true, Some(parent)) = (shown[i], node.parent) {
                 shown[parent as usize] = true;

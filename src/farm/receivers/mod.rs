@@ -275,7 +275,7 @@ fn gaze(scene: &Scene, eye: &Eye, film: DVec2, rng: &mut Generator) -> Seen {
 }
 
 /// The eye of a camera of a checked job.
-fn camera_eye(scene: &Scene, camera: &Camera) -> Eye {
+pub(super) fn camera_eye(scene: &Scene, camera: &Camera) -> Eye {
     let aspect = f64::from(camera.width) / f64::from(camera.height);
     match &camera.node {
         Some(name) => Eye::from_node(scene.camera(name).expect("the node was found when the job was planned"), aspect),

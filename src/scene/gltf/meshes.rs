@@ -105,7 +105,7 @@ impl<'a> Baker<'a> {
         model.surface_of = self.surface_of;
         model.nodes.of_triangle = self.node_of;
         model.surfaces = self.materials.into_surfaces();
-        drop_unused_vertices(model);
+        model.drop_unused_vertices();
     }
 
     /// How `primitive` makes triangles; `None`, with a warning, for points and lines.
@@ -223,19 +223,4 @@ fn note_ignored(primitive: &Primitive, mesh: &str, warnings: &mut Warnings) {
     if primitive.attributes.contains_key("NORMAL") {
         warnings.add("interpolated normals are not used: all cosines are those of the geometry");
     }
-}
-
-/// Removes vertices that no triangle uses, so that they do not count for the extent of the scene.
-fn drop_unused_vertices(model: &mut Model) {
-    let mut used = vec![false; model.positions.len()];
-    model.triangles.iter().flatten().for_each(|&corner| used[corner as usize] = true);
-    let mut next = 0;
-    let mut renumbered = vec![0; used.len()];
-    for (new, &kept) in renumbered.iter_mut().zip(&used) {
-        *new = next;
-        next += u32::from(kept);
-    }
-    model.triangles.iter_mut().flatten().for_each(|corner| *corner = renumbered[*corner as usize]);
-    let mut kept = used.iter();
-    model.positions.retain(|_| kept.next().copied().unwrap_or(false));
 }
