@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes the scenes that ship, scenes/{room,cornell,furnace}.glb, bit for bit the same on every machine.
+"""Writes the scenes that ship, scenes/{room,cornell,furnace,figure2}.glb, bit for bit the same on every machine.
 
     scripts/make_scenes.py            write them
     scripts/make_scenes.py --check    compare them with the files that are there; exit 1 where one differs
@@ -18,13 +18,15 @@ import sys
 from collections import Counter
 from pathlib import Path
 
+import head
+
 SCENES = Path(__file__).resolve().parent.parent / "scenes"
 
 
 def main():
     check = parse_arguments(sys.argv[1:])
     wrong = 0
-    for name, build in [("room", room), ("cornell", cornell), ("furnace", furnace)]:
+    for name, build in [("room", room), ("cornell", cornell), ("furnace", furnace), ("figure2", figure2)]:
         path, content = SCENES / f"{name}.glb", build()
         if not check:
             path.write_bytes(content)
@@ -48,6 +50,23 @@ def parse_arguments(arguments):
 
 def room():
     """The room of the paper's Figure 2 without the head: 6 x 4 x 3 m, a square column, a lamp of 1000 lm."""
+    return hall_with_column("Room of the paper's Figure 2, without the head").bytes()
+
+
+def figure2():
+    """The same with the head, larger than life: 21,168 triangles with 31,752 edges, hanging before the column."""
+    gltf = hall_with_column("Room of the paper's Figure 2")
+    faces = head.mesh(42)
+    check_closed(faces, sum(determinant(*t) for t in triangles(faces)) / 6.0)
+    # Turned about +Y so that it looks a little past the camera, three and a half times as large as a head.
+    sine, cosine = half_angle(-0.8, 0.6)
+    placement = {"translation": [2.5, 1.35, -1.5], "rotation": [0.0, sine, 0.0, cosine], "scale": [3.5, 3.5, 3.5]}
+    gltf.surface("Head", faces, grey("head 0.6", 0.6), placement)
+    return gltf.bytes()
+
+
+def hall_with_column(title):
+    """Hall, column, lamp and camera that both rooms have."""
     hall = box((0.0, 0.0, -4.0), (6.0, 3.0, 0.0))
     column = box((3.9, 0.0, -2.8), (4.3, 3.0, -2.4))
     floor = ring(reverse(hall["-y"]), reverse(column["-y"]))
@@ -56,7 +75,7 @@ def room():
     column_sides = [column[side] for side in SIDES]
     check_closed([*floor, *ceiling, *walls, *column_sides], -(6.0 * 4.0 * 3.0 - 0.4 * 0.4 * 3.0))
 
-    gltf = Gltf("Room of the paper's Figure 2, without the head")
+    gltf = Gltf(title)
     gltf.surface("floor", floor, grey("floor 0.3", 0.3))
     gltf.surface("ceiling", ceiling, grey("ceiling 0.7", 0.7))
     wall_material = grey("wall 0.5", 0.5)
@@ -66,7 +85,7 @@ def room():
     gltf.surface("column", [*column_sides, column["-y"], column["+y"]], wall_material)
     gltf.lamp("lamp", (2.0, 2.7, -2.4), 1000.0 / (4.0 * math.pi))
     gltf.camera("camera", (0.35, 1.75, -0.35), (3.75, 1.2, -2.35), math.pi / 3.0)
-    return gltf.bytes()
+    return gltf
 
 
 def cornell():
@@ -227,7 +246,7 @@ def emitting(material, colour, luminance):
 
 
 class Gltf:
-    """A glTF 2.0 file in the making: one node and mesh per surface, all node transforms the identity."""
+    """A glTF 2.0 file in the making: one node and mesh per surface."""
 
     def __init__(self, title):
         self.binary = b""
@@ -238,7 +257,7 @@ class Gltf:
             "nodes": [],
         }
 
-    def surface(self, name, faces, material):
+    def surface(self, name, faces, material, placement=None):
         """Adds a mesh of indexed triangles without normals, so that every face is flat."""
         corners = triangles(faces)
         positions = list(dict.fromkeys(p for triangle in corners for p in triangle))
@@ -247,7 +266,7 @@ class Gltf:
         primitive = {"attributes": {"POSITION": self.positions(positions)}, "indices": self.indices(indices)}
         primitive["material"] = self.material(material)
         mesh = self.add("meshes", {"name": name, "primitives": [primitive]})
-        self.node({"name": name, "mesh": mesh})
+        self.node({"name": name, "mesh": mesh, **(placement or {})})
 
     def lamp(self, name, position, intensity):
         """Adds a point light of `intensity` [cd] in all directions."""
