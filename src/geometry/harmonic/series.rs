@@ -20,7 +20,10 @@
 //! near the poles else, and k times so.
 //! The gradient on the sphere is g - (g,n) n. The functions are those of the paper's (18) times sqrt(2) (-1)^m, m > 0.
 
+#![allow(clippy::needless_range_loop, reason = "several arrays go by one lane")]
+
 use crate::error::{Error, Result};
+use crate::geometry::simd::{Isa, Kernel, Path};
 use crate::math::{DVec3, PI, gauss_legendre, sin_cos};
 
 /// The largest degree N.
@@ -32,6 +35,21 @@ pub struct Series {
     degree: usize,
     /// Orders one after the other, degrees k = m ..= N in each.
     terms: Vec<Term>,
+    /// The same, [`LANES`] orders side by side.
+    groups: Vec<Vec<Row>>,
+    path: Path,
+}
+
+/// Orders that are summed side by side: two registers of AVX-512, so that one waits less for the other.
+const LANES: usize = 16;
+
+/// Terms with the same k - m of neighbouring orders m; 0 beyond the degree of the series.
+#[derive(Clone, Debug, PartialEq)]
+struct Row {
+    cosine: [f64; LANES],
+    sine: [f64; LANES],
+    ahead: [f64; LANES],
+    behind: [f64; LANES],
 }
 
 /// A pair of coefficients and the recurrence that leads to its function.
@@ -91,7 +109,8 @@ impl Series {
                 terms.push(Term { cosine, sine, ahead, behind });
             }
         }
-        Ok(Series { degree, terms })
+        let groups = groups(degree, &terms);
+        Ok(Series { degree, terms, groups, path: Path::chosen().unwrap_or(Path::Scalar) })
     }
 
     /// The constant function.
@@ -128,57 +147,12 @@ impl Series {
 
     /// r in the direction of the unit vector `n`.
     pub fn value(&self, n: DVec3) -> f64 {
-        let (mut value, mut rest) = (0.0, &self.terms[..]);
-        let (mut re, mut im) = (1.0, 0.0);
-        let across2 = n.x * n.x + n.y * n.y;
-        for m in 0..=self.degree {
-            let (of_order, others) = rest.split_at(self.degree + 1 - m);
-            rest = others;
-            let (mut h, mut previous) = (of_order[0].ahead, 0.0);
-            let (mut a, mut b) = (of_order[0].cosine * h, of_order[0].sine * h);
-            for term in &of_order[1..] {
-                let next = n.z * (term.ahead * h - term.behind * (n.z * previous)) - term.behind * (across2 * previous);
-                (previous, h) = (h, next);
-                a += term.cosine * h;
-                b += term.sine * h;
-            }
-            value += a * re + b * im;
-            (re, im) = (re * n.x - im * n.y, re * n.y + im * n.x);
-        }
-        value
+        self.path.run(At::<false> { series: self, n }).value
     }
 
     /// r and its gradient in the direction of the unit vector `n`.
     pub fn slope(&self, n: DVec3) -> Slope {
-        let (mut value, mut g, mut rest) = (0.0, DVec3::ZERO, &self.terms[..]);
-        let (mut re, mut im, mut re_before, mut im_before) = (1.0, 0.0, 0.0, 0.0);
-        let across2 = n.x * n.x + n.y * n.y;
-        for m in 0..=self.degree {
-            let (of_order, others) = rest.split_at(self.degree + 1 - m);
-            rest = others;
-            let (mut h, mut previous) = (of_order[0].ahead, 0.0);
-            let (mut dh, mut previous_dh) = (0.0, 0.0);
-            let (mut a, mut b) = (of_order[0].cosine * h, of_order[0].sine * h);
-            let (mut da, mut db) = (0.0, 0.0);
-            for term in &of_order[1..] {
-                let next = n.z * (term.ahead * h - term.behind * (n.z * previous)) - term.behind * (across2 * previous);
-                let next_dh = term.ahead * (h + n.z * dh) - term.behind * previous_dh;
-                (previous, h) = (h, next);
-                (previous_dh, dh) = (dh, next_dh);
-                a += term.cosine * h;
-                b += term.sine * h;
-                da += term.cosine * dh;
-                db += term.sine * dh;
-            }
-            let order = m as f64;
-            value += a * re + b * im;
-            g.x += order * (a * re_before + b * im_before);
-            g.y += order * (b * re_before - a * im_before);
-            g.z += da * re + db * im;
-            (re_before, im_before) = (re, im);
-            (re, im) = (re * n.x - im * n.y, re * n.y + im * n.x);
-        }
-        Slope { value, gradient: g - g.dot(n) * n }
+        self.path.run(At::<true> { series: self, n })
     }
 
     /// The norm |c_k| of the coefficients of each degree: sqrt(sum over m of c^2 + s^2), which bounds that part of r everywhere.
@@ -201,6 +175,81 @@ impl Series {
             fourth: sum(|k| k * k * k * k),
         }
     }
+}
+
+/// The terms, orders side by side.
+fn groups(degree: usize, terms: &[Term]) -> Vec<Vec<Row>> {
+    let zero = Row { cosine: [0.0; LANES], sine: [0.0; LANES], ahead: [0.0; LANES], behind: [0.0; LANES] };
+    let mut groups: Vec<Vec<Row>> = (0..=degree).step_by(LANES).map(|m| vec![zero.clone(); degree + 1 - m]).collect();
+    let mut terms = terms.iter();
+    for m in 0..=degree {
+        for (row, term) in groups[m / LANES].iter_mut().zip(terms.by_ref().take(degree + 1 - m)) {
+            let lane = m % LANES;
+            (row.cosine[lane], row.sine[lane]) = (term.cosine, term.sine);
+            (row.ahead[lane], row.behind[lane]) = (term.ahead, term.behind);
+        }
+    }
+    groups
+}
+
+/// A series in a direction, with its gradient or without. Lanes are summed by plain operations and joined order by order, so the bits
+/// are those of a loop over single terms, on any processor.
+struct At<'a, const GRADIENT: bool> {
+    series: &'a Series,
+    n: DVec3,
+}
+
+impl<const GRADIENT: bool> Kernel for At<'_, GRADIENT> {
+    type Output = Slope;
+
+    #[inline(always)]
+    fn run<I: Isa>(self) -> Slope {
+        let n = self.n;
+        let (mut value, mut g) = (0.0, DVec3::ZERO);
+        let (mut re, mut im, mut re_before, mut im_before) = (1.0, 0.0, 0.0, 0.0);
+        let mut orders = 0..=self.series.degree;
+        for group in &self.series.groups {
+            let [a, b, da, db] = sums::<GRADIENT>(group, n);
+            for (lane, m) in (0..LANES).zip(orders.by_ref()) {
+                value += a[lane] * re + b[lane] * im;
+                if GRADIENT {
+                    let order = m as f64;
+                    g.x += order * (a[lane] * re_before + b[lane] * im_before);
+                    g.y += order * (b[lane] * re_before - a[lane] * im_before);
+                    g.z += da[lane] * re + db[lane] * im;
+                }
+                (re_before, im_before) = (re, im);
+                (re, im) = (re * n.x - im * n.y, re * n.y + im * n.x);
+            }
+        }
+        Slope { value, gradient: g - g.dot(n) * n }
+    }
+}
+
+/// A_m, B_m and their derivatives by z of the orders of a group.
+#[inline(always)]
+fn sums<const GRADIENT: bool>(group: &[Row], n: DVec3) -> [[f64; LANES]; 4] {
+    let across2 = n.x * n.x + n.y * n.y;
+    let zero = [0.0; LANES];
+    let (mut a, mut b, mut da, mut db) = (zero, zero, zero, zero);
+    let (mut h, mut previous, mut dh, mut previous_dh) = (zero, zero, zero, zero);
+    for (step, row) in group.iter().enumerate() {
+        for i in 0..LANES {
+            let (ahead, behind) = (row.ahead[i], row.behind[i]);
+            let next = n.z * (ahead * h[i] - behind * (n.z * previous[i])) - behind * (across2 * previous[i]);
+            let next = if step == 0 { ahead } else { next };
+            if GRADIENT {
+                let next_dh = ahead * (h[i] + n.z * dh[i]) - behind * previous_dh[i];
+                (previous_dh[i], dh[i]) = (dh[i], if step == 0 { 0.0 } else { next_dh });
+                da[i] += row.cosine[i] * dh[i];
+                db[i] += row.sine[i] * dh[i];
+            }
+            (previous[i], h[i]) = (h[i], next);
+            a[i] += row.cosine[i] * h[i];
+            b[i] += row.sine[i] * h[i];
+        }
+    }
+    [a, b, da, db]
 }
 
 /// What r and its derivatives along any great circle, by the angle, do not exceed; from |c_k| alone, so never too little and
