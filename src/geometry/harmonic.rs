@@ -5,25 +5,29 @@
 //!
 //! ```text
 //! F(t) = |o + t d| - r((o + t d)/|o + t d|):  positive outside, negative inside, 0 on the surface
-//! F'   = (x,d)/|x| - (grad r, d)/|x|
-//! F(t + s) >= F + F' s - K s^2/2,             K = (M2 + M1)/R^2 where |x| >= R from t to t + s
+//! F'   = c - (grad r, d)/|x|,                                  c = (x,d)/|x|
+//! F''  = (1 - c^2)/|x| - (w'Hw - 2 c (g,w) - (1 - c^2)(g,n))/|x|^2,  w = d - c n,  n = x/|x|
+//! |F''|  <= (M2 + M1)/R^2 + 1/R,                                          where |x| >= R
+//! |F'''| <= (M3 + 2.31 M2 + 2 M1)/R^3 + 1.16/R^2
 //! ```
 //!
-//! with M1 and M2 the bounds of the first and second derivatives of r along great circles: the second derivative of r
-//! along a line is r'' a'^2 + r' a'', with a the angle, a' <= 1/|x| and |a''| <= 1/|x|^2, and |x| itself is convex. So from any
-//! point outside, steps to the zero of that parabola pass no surface, and near a crossing they converge on it as fast as
-//! Newton's. From inside -F is taken, and |x| adds at most 1/R to K.
+//! with M1, M2, M3 the bounds of the derivatives of r along great circles: along a line the angle a has a' = s/|x|,
+//! a'' = -2 s c/|x|^2, a''' = -2 (s^3 - 3 s c^2)/|x|^3, s^2 = 1 - c^2, and s^2 c <= 0.385. So where the parabola or the cubic that starts with
+//! these derivatives and falls below F by its bound stays positive there is no surface: steps to its zero pass none, and near a
+//! crossing they converge on it faster than Newton's. From inside -F is taken.
 
 pub mod file;
 mod series;
 mod shells;
+mod steps;
 
-pub use series::{Bounds, MAX_DEGREE, Series, Slope, basis, projection};
+pub use series::{Bend, Bounds, MAX_DEGREE, Series, Slope, basis, projection};
 
 use super::{Hit, Ray, hit};
 use crate::error::{Error, Result};
 use crate::math::{DMat3, DVec3, PI};
 use shells::radii;
+use steps::{Taylor, safe_step};
 
 /// What the sum of a series and its comparison with |x| round, in units of its largest radius.
 const ROUNDING: f64 = 1e-14;
@@ -50,10 +54,9 @@ pub struct Crossing {
     pub normal: DVec3,
 }
 
-/// F and its derivative along a line, and where.
+/// F and its derivatives along a line, and where.
 struct Height {
-    value: f64,
-    rise: f64,
+    along: Taylor,
     slope: Slope,
     direction: DVec3,
 }
@@ -110,7 +113,7 @@ impl Star {
         let core = nearest - half_core..nearest + half_core;
         let floor = ROUNDING * high;
         let least = low.max(across2.sqrt());
-        let curvature = (self.bounds.second + self.bounds.first) / (least * least);
+        let bounds = self.derivatives(least);
         // Entering the ball around the surface is being outside; else the first look tells.
         let (mut side, mut height) = (if at > 0.0 { 1.0 } else { 0.0 }, None);
         for _ in 0..MAX_STEPS {
@@ -123,19 +126,18 @@ impl Star {
             }
             let here = self.height(o + at * d, d);
             if side == 0.0 {
-                side = if here.value < 0.0 { -1.0 } else { 1.0 };
-                if here.value.abs() <= floor && here.rise * side < 0.0 {
+                side = if here.along.value < 0.0 { -1.0 } else { 1.0 };
+                if here.along.value.abs() <= floor && here.along.first * side < 0.0 {
                     // Starting on the surface and going through it.
                     side = -side;
                 }
             }
-            let (value, rise) = (side * here.value, side * here.rise);
+            let along = here.along.times(side);
             height = Some((at, here));
-            if value <= floor && (rise <= 0.0 || value < -floor) {
+            if along.value <= floor && (along.first <= 0.0 || along.value < -floor) {
                 break;
             }
-            let bend = if side > 0.0 { curvature } else { curvature + 1.0 / least };
-            let step = safe_step(value.max(0.0), rise, bend);
+            let step = safe_step(&along, bounds);
             // From inside the bound holds outside the core only, beyond which all is known.
             let next = at + step;
             let next = if side < 0.0 && at < core.start { next.min(core.end) } else { next };
@@ -149,12 +151,29 @@ impl Star {
         Some(Crossing { distance: at, position: height.slope.value * height.direction, normal })
     }
 
+    /// Bounds of the second and third derivatives of F where |x| is at least `least`.
+    fn derivatives(&self, least: f64) -> [f64; 2] {
+        let Bounds { first, second, third, .. } = self.bounds;
+        let square = least * least;
+        let of_second = (second + first) / square + 1.0 / least;
+        [of_second, (third + 2.31 * second + 2.0 * first) / (square * least) + 1.16 / square]
+    }
+
     fn height(&self, x: DVec3, d: DVec3) -> Height {
         let length = x.length();
         let direction = x / length;
-        let slope = self.series.slope(direction);
-        let rise = direction.dot(d) - slope.gradient.dot(d) / length;
-        Height { value: length - slope.value, rise, slope, direction }
+        let bend = self.series.bend(direction);
+        let slope = bend.slope(direction);
+        let c = direction.dot(d);
+        let w = d - c * direction;
+        let across = 1.0 - c * c;
+        let turned = w.dot(bend.hessian * w) - 2.0 * c * bend.g.dot(w) - across * bend.g.dot(direction);
+        let along = Taylor {
+            value: length - slope.value,
+            first: c - slope.gradient.dot(d) / length,
+            second: (across - turned / length) / length,
+        };
+        Height { along, slope, direction }
     }
 
     /// Volume, by a rule that is exact for r^3.
@@ -176,12 +195,6 @@ impl Star {
         let mean = projection(0, 2 * self.series.degree() + 16, values);
         4.0 * PI * mean.map_or(f64::NAN, |mean| mean.value(DVec3::Z))
     }
-}
-
-/// The largest s with value + rise s - bend s^2/2 >= 0, the value not negative.
-fn safe_step(value: f64, rise: f64, bend: f64) -> f64 {
-    let root = (rise * rise + 2.0 * bend * value).sqrt();
-    if rise > 0.0 { (rise + root) / bend } else { 2.0 * value / (root - rise) }
 }
 
 fn normal_and_area(slope: &Slope, n0: DVec3) -> (DVec3, f64) {

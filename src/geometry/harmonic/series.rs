@@ -24,7 +24,7 @@
 
 use crate::error::{Error, Result};
 use crate::geometry::simd::{Isa, Kernel, Path};
-use crate::math::{DVec3, PI, gauss_legendre, sin_cos};
+use crate::math::{DMat3, DVec3, PI, gauss_legendre, sin_cos};
 
 /// The largest degree N.
 pub const MAX_DEGREE: usize = 128;
@@ -69,6 +69,24 @@ pub struct Slope {
     pub value: f64,
     /// The gradient of r on the sphere, orthogonal to n \[unit of r per rad\].
     pub gradient: DVec3,
+}
+
+/// Value and derivatives in a direction, of the function of x, y and z that is r on the sphere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bend {
+    /// r(n).
+    pub value: f64,
+    /// g; the part across n is the gradient on the sphere \[unit of r per rad\].
+    pub g: DVec3,
+    /// Second derivatives.
+    pub hessian: DMat3,
+}
+
+impl Bend {
+    /// The gradient of r on the sphere, in the direction `n` that this belongs to.
+    pub fn slope(&self, n: DVec3) -> Slope {
+        Slope { value: self.value, gradient: self.g - self.g.dot(n) * n }
+    }
 }
 
 /// Coefficients of degree k and order m stand at `index(k, m)`: degree after degree, orders in each.
@@ -147,12 +165,18 @@ impl Series {
 
     /// r in the direction of the unit vector `n`.
     pub fn value(&self, n: DVec3) -> f64 {
-        self.path.run(At::<false> { series: self, n }).value
+        self.path.run(At::<0> { series: self, n }).value
     }
 
     /// r and its gradient in the direction of the unit vector `n`.
     pub fn slope(&self, n: DVec3) -> Slope {
-        self.path.run(At::<true> { series: self, n })
+        let bend = self.path.run(At::<1> { series: self, n });
+        Slope { value: bend.value, gradient: bend.g - bend.g.dot(n) * n }
+    }
+
+    /// r, g and the second derivatives in the direction of the unit vector `n`.
+    pub fn bend(&self, n: DVec3) -> Bend {
+        self.path.run(At::<2> { series: self, n })
     }
 
     /// The norm |c_k| of the coefficients of each degree: sqrt(sum over m of c^2 + s^2), which bounds that part of r everywhere.
@@ -172,6 +196,7 @@ impl Series {
             high: middle + around,
             first: sum(|k| (0.5 * k * (k + 1.0)).sqrt()),
             second: sum(|k| k * k),
+            third: sum(|k| k * k * k),
             fourth: sum(|k| k * k * k * k),
         }
     }
@@ -192,64 +217,85 @@ fn groups(degree: usize, terms: &[Term]) -> Vec<Vec<Row>> {
     groups
 }
 
-/// A series in a direction, with its gradient or without. Lanes are summed by plain operations and joined order by order, so the bits
-/// are those of a loop over single terms, on any processor.
-struct At<'a, const GRADIENT: bool> {
+/// A series in a direction, with as many derivatives as `DERIVATIVES`, the others 0. Lanes are summed by plain operations and joined
+/// order by order, so the bits are those of a loop over single terms, on any processor.
+struct At<'a, const DERIVATIVES: u32> {
     series: &'a Series,
     n: DVec3,
 }
 
-impl<const GRADIENT: bool> Kernel for At<'_, GRADIENT> {
-    type Output = Slope;
+impl<const DERIVATIVES: u32> Kernel for At<'_, DERIVATIVES> {
+    type Output = Bend;
 
     #[inline(always)]
-    fn run<I: Isa>(self) -> Slope {
+    fn run<I: Isa>(self) -> Bend {
         let n = self.n;
         let (mut value, mut g) = (0.0, DVec3::ZERO);
-        let (mut re, mut im, mut re_before, mut im_before) = (1.0, 0.0, 0.0, 0.0);
+        let [mut xx, mut xy, mut xz, mut yz, mut zz] = [0.0; 5];
+        // (x + i y)^m, and the same with m - 1 and m - 2.
+        let (mut power, mut before, mut second) = ([1.0, 0.0], [0.0; 2], [0.0; 2]);
         let mut orders = 0..=self.series.degree;
         for group in &self.series.groups {
-            let [a, b, da, db] = sums::<GRADIENT>(group, n);
+            let of = sums::<DERIVATIVES>(group, n);
             for (lane, m) in (0..LANES).zip(orders.by_ref()) {
-                value += a[lane] * re + b[lane] * im;
-                if GRADIENT {
-                    let order = m as f64;
-                    g.x += order * (a[lane] * re_before + b[lane] * im_before);
-                    g.y += order * (b[lane] * re_before - a[lane] * im_before);
-                    g.z += da[lane] * re + db[lane] * im;
+                let [a, b, da, db, dda, ddb] = of.map(|lanes| lanes[lane]);
+                let order = m as f64;
+                value += a * power[0] + b * power[1];
+                if DERIVATIVES >= 1 {
+                    g.x += order * (a * before[0] + b * before[1]);
+                    g.y += order * (b * before[0] - a * before[1]);
+                    g.z += da * power[0] + db * power[1];
                 }
-                (re_before, im_before) = (re, im);
-                (re, im) = (re * n.x - im * n.y, re * n.y + im * n.x);
+                if DERIVATIVES >= 2 {
+                    let pairs = order * (order - 1.0);
+                    xx += pairs * (a * second[0] + b * second[1]);
+                    xy += pairs * (b * second[0] - a * second[1]);
+                    xz += order * (da * before[0] + db * before[1]);
+                    yz += order * (db * before[0] - da * before[1]);
+                    zz += dda * power[0] + ddb * power[1];
+                }
+                (second, before) = (before, power);
+                power = [power[0] * n.x - power[1] * n.y, power[0] * n.y + power[1] * n.x];
             }
         }
-        Slope { value, gradient: g - g.dot(n) * n }
+        // The powers are harmonic in x and y.
+        let hessian = DMat3::from_cols_array(&[xx, xy, xz, xy, -xx, yz, xz, yz, zz]);
+        Bend { value, g, hessian }
     }
 }
 
-/// A_m, B_m and their derivatives by z of the orders of a group.
+/// A_m, B_m and their first and second derivatives by z of the orders of a group.
 #[inline(always)]
-fn sums<const GRADIENT: bool>(group: &[Row], n: DVec3) -> [[f64; LANES]; 4] {
+fn sums<const DERIVATIVES: u32>(group: &[Row], n: DVec3) -> [[f64; LANES]; 6] {
     let across2 = n.x * n.x + n.y * n.y;
     let zero = [0.0; LANES];
-    let (mut a, mut b, mut da, mut db) = (zero, zero, zero, zero);
-    let (mut h, mut previous, mut dh, mut previous_dh) = (zero, zero, zero, zero);
+    let [mut a, mut b, mut da, mut db, mut dda, mut ddb] = [zero; 6];
+    // H and its derivatives of the last step, and of the one before.
+    let [mut h, mut h0, mut dh, mut dh0, mut ddh, mut ddh0] = [zero; 6];
     for (step, row) in group.iter().enumerate() {
         for i in 0..LANES {
             let (ahead, behind) = (row.ahead[i], row.behind[i]);
-            let next = n.z * (ahead * h[i] - behind * (n.z * previous[i])) - behind * (across2 * previous[i]);
-            let next = if step == 0 { ahead } else { next };
-            if GRADIENT {
-                let next_dh = ahead * (h[i] + n.z * dh[i]) - behind * previous_dh[i];
-                (previous_dh[i], dh[i]) = (dh[i], if step == 0 { 0.0 } else { next_dh });
-                da[i] += row.cosine[i] * dh[i];
-                db[i] += row.sine[i] * dh[i];
+            let (cosine, sine) = (row.cosine[i], row.sine[i]);
+            if DERIVATIVES >= 2 {
+                let next = if step == 0 { 0.0 } else { ahead * (2.0 * dh[i] + n.z * ddh[i]) - behind * ddh0[i] };
+                (ddh0[i], ddh[i]) = (ddh[i], next);
+                dda[i] += cosine * next;
+                ddb[i] += sine * next;
             }
-            (previous[i], h[i]) = (h[i], next);
-            a[i] += row.cosine[i] * h[i];
-            b[i] += row.sine[i] * h[i];
+            if DERIVATIVES >= 1 {
+                let next = if step == 0 { 0.0 } else { ahead * (h[i] + n.z * dh[i]) - behind * dh0[i] };
+                (dh0[i], dh[i]) = (dh[i], next);
+                da[i] += cosine * next;
+                db[i] += sine * next;
+            }
+            let next = n.z * (ahead * h[i] - behind * (n.z * h0[i])) - behind * (across2 * h0[i]);
+            let next = if step == 0 { ahead } else { next };
+            (h0[i], h[i]) = (h[i], next);
+            a[i] += cosine * next;
+            b[i] += sine * next;
         }
     }
-    [a, b, da, db]
+    [a, b, da, db, dda, ddb]
 }
 
 /// What r and its derivatives along any great circle, by the angle, do not exceed; from |c_k| alone, so never too little and
@@ -264,6 +310,8 @@ pub struct Bounds {
     pub first: f64,
     /// Magnitude of the second derivative.
     pub second: f64,
+    /// Magnitude of the third derivative.
+    pub third: f64,
     /// Magnitude of the fourth derivative.
     pub fourth: f64,
 }
