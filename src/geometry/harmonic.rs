@@ -23,10 +23,15 @@ mod steps;
 
 pub use series::{Bend, Bounds, MAX_DEGREE, Series, Slope, basis, projection};
 
+use super::bvh::Build;
+use super::mesh::{Mesh, bits};
+use super::simd::Isa;
+use super::visibility::{BUNDLES, Lanes, Points, Scratch};
 use super::{Hit, Ray, hit};
 use crate::error::{Error, Result};
-use crate::math::{DMat3, DVec3, PI};
-use shells::radii;
+use crate::math::{DMat3, DVec3, PI, Vec3};
+use shells::{Shells, radii};
+use std::sync::Arc;
 use steps::{Taylor, safe_step};
 
 /// What the sum of a series and its comparison with |x| round, in units of its largest radius.
@@ -203,7 +208,7 @@ fn normal_and_area(slope: &Slope, n0: DVec3) -> (DVec3, f64) {
 }
 
 /// A star-shaped object in the world.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Harmonic {
     star: Star,
     /// Where its centre stands \[m\].
@@ -211,6 +216,14 @@ pub struct Harmonic {
     /// From its coordinates to those of the world, about the centre.
     to_world: DMat3,
     to_own: DMat3,
+    shells: Option<Arc<Shelled>>,
+}
+
+/// Meshes that decide for most rays and segments between points outside: what crosses the inner one crosses the surface, what does
+/// not cross the outer one does not.
+struct Shelled {
+    inner: Mesh,
+    outer: Mesh,
 }
 
 impl Harmonic {
@@ -224,7 +237,7 @@ impl Harmonic {
             let allowed = "a transform that flattens nothing";
             return Err(Error::input("harmonic", "transform", format!("{to_world:?}"), allowed));
         }
-        Ok(Harmonic { star, center, to_world, to_own })
+        Ok(Harmonic { star, center, to_world, to_own, shells: None })
     }
 
     /// The object in its own coordinates.
@@ -264,6 +277,55 @@ impl Harmonic {
         self.star.contains(self.to_own * (p - self.center))
     }
 
+    /// The same object with meshes inside and outside of it, for rays that come from anywhere in the box `around` \[m\].
+    pub(super) fn shelled(mut self, around: (DVec3, DVec3)) -> Self {
+        // Rounding to f32 moves a corner by half a unit of the largest coordinate; where a triangle is steep, that counts several times.
+        let coordinate = around.0.abs().max(around.1.abs()).max_element();
+        let columns = [self.to_own.x_axis, self.to_own.y_axis, self.to_own.z_axis];
+        let shrunk = columns.iter().map(|c| c.length_squared()).sum::<f64>().sqrt();
+        let margin = 64.0 / f64::from(1 << 24) * coordinate * shrunk / self.star.radii.0;
+        let shells = Shells::new(&self.star, margin);
+        let mesh = |triangles: &[[DVec3; 3]]| {
+            let place = |p: DVec3| (self.center + self.to_world * p).as_vec3();
+            let mirrored = self.to_world.determinant() < 0.0;
+            let turned = |[a, b, c]: [DVec3; 3]| if mirrored { [a, c, b] } else { [a, b, c] };
+            let triangles: Vec<_> = triangles.iter().map(|&t| turned(t).map(place)).collect();
+            Mesh::within(&triangles, Build::Thorough, around)
+        };
+        self.shells = Some(Arc::new(Shelled { inner: mesh(&shells.inner), outer: mesh(&shells.outer) }));
+        self
+    }
+
+    /// Clears the bits of the points in `seen` that `apex` does not see for this object; `inside` has those inside it.
+    #[inline(always)]
+    pub(super) fn shadow<I: Isa>(
+        &self,
+        apex: Vec3,
+        points: &Points,
+        inside: &Lanes,
+        seen: &mut Lanes,
+        scratch: &mut Scratch,
+    ) {
+        let mut undecided = *seen;
+        if let Some(shells) = self.shells.as_ref().filter(|_| !self.contains(apex.as_dvec3())) {
+            let (mut open, mut clear) = (*seen, *seen);
+            shells.inner.shadow::<I>(apex, points, &mut open, scratch);
+            shells.outer.shadow::<I>(apex, points, &mut clear, scratch);
+            for bundle in 0..BUNDLES {
+                // Between two points outside; the others are asked one by one.
+                let (one, inside) = (seen[bundle], inside[bundle]);
+                seen[bundle] &= open[bundle] | inside;
+                undecided[bundle] = one & (inside | open[bundle] & !clear[bundle]);
+            }
+        }
+        for (bundle, seen) in seen.iter_mut().enumerate() {
+            for lane in bits(u32::from(undecided[bundle])) {
+                let blocked = self.crosses(apex.as_dvec3(), points.point(bundle, lane).as_dvec3());
+                *seen &= !(u16::from(blocked) << lane);
+            }
+        }
+    }
+
     /// The point of the surface in the direction `n0` of its own coordinates \[m\], its outward normal, and the area for each unit of solid angle
     /// there \[m2/sr\].
     pub fn point(&self, n0: DVec3) -> (DVec3, DVec3, f64) {
@@ -291,20 +353,55 @@ impl Harmonic {
 
     /// The first point of the surface along `ray`, at most `limit` away \[m\].
     pub(super) fn hit(&self, ray: &Ray, limit: f64) -> Option<Hit> {
+        let skipped = self.way_to(ray)?;
         let direction = self.to_own * ray.direction;
         let scale = direction.length();
-        let origin = self.to_own * (ray.origin - self.center);
-        let crossing = self.star.first_crossing(origin, direction / scale, limit * scale)?;
+        let origin = self.to_own * (ray.origin + skipped * ray.direction - self.center);
+        let crossing = self.star.first_crossing(origin, direction / scale, (limit - skipped) * scale)?;
         let normal = (self.to_own.transpose() * crossing.normal).normalize();
         let position = self.center + self.to_world * crossing.position;
-        Some(hit(ray, crossing.distance / scale, position, normal))
+        Some(hit(ray, skipped + crossing.distance / scale, position, normal))
+    }
+
+    /// How far along `ray` there is certainly nothing; `None` where it misses the object \[m\].
+    fn way_to(&self, ray: &Ray) -> Option<f64> {
+        let Some(shells) = &self.shells else { return Some(0.0) };
+        let outer = shells.outer.closest_hit(ray, f64::INFINITY)?;
+        // From behind it starts between the shells, or inside.
+        Some(if outer.front { (outer.distance * (1.0 - 1e-9)).max(0.0) } else { 0.0 })
     }
 
     /// True when the segment between `a` and `b` crosses the surface \[m\].
-    pub(super) fn blocks(&self, a: DVec3, b: DVec3) -> bool {
+    pub(super) fn blocks(&self, a: Vec3, b: Vec3) -> bool {
+        let (from, to) = (a.as_dvec3(), b.as_dvec3());
+        if let Some(shells) = self.shells.as_ref().filter(|_| !self.contains(from) && !self.contains(to)) {
+            if !shells.outer.blocks(a, b) {
+                return false;
+            }
+            if shells.inner.blocks(a, b) {
+                return true;
+            }
+        }
+        self.crosses(from, to)
+    }
+
+    /// The same by the series alone.
+    fn crosses(&self, a: DVec3, b: DVec3) -> bool {
         let (from, to) = (self.to_own * (a - self.center), self.to_own * (b - self.center));
         let along = to - from;
         let length = along.length();
         length > 0.0 && self.star.first_crossing(from, along / length, length).is_some()
+    }
+}
+
+impl std::fmt::Debug for Harmonic {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        write!(
+            f,
+            "Harmonic {{ degree {}, center {}, to_world {} }}",
+            self.star.series.degree(),
+            self.center,
+            self.to_world
+        )
     }
 }

@@ -70,8 +70,12 @@ impl Mesh {
 
     /// The same with more or less care.
     pub fn built(triangles: &[[Vec3; 3]], build: Build) -> Self {
-        let empty = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        let bounds = triangles.iter().flatten().fold(empty, |(low, high), p| {
+        Mesh::within(triangles, build, (DVec3::INFINITY, DVec3::NEG_INFINITY))
+    }
+
+    /// The same for rays and segments that come from anywhere in the box between two corners.
+    pub(super) fn within(triangles: &[[Vec3; 3]], build: Build, around: (DVec3, DVec3)) -> Self {
+        let bounds = triangles.iter().flatten().fold(around, |(low, high), p| {
             let p = p.as_dvec3();
             (low.min(p), high.max(p))
         });

@@ -86,6 +86,11 @@ impl Geometry {
     /// The same geometry and star-shaped objects, re-centred too.
     pub fn with_harmonics(mut self, harmonics: Vec<Harmonic>) -> Self {
         self.harmonics = harmonics;
+        let (low, high) = self.bounds();
+        // Lifted points may stand a little beyond.
+        let around = 0.01 * (high - low).max_element();
+        let shelled = |h: Harmonic| h.shelled((low - around, high + around));
+        self.harmonics = std::mem::take(&mut self.harmonics).into_iter().map(shelled).collect();
         self.measured()
     }
 
@@ -200,7 +205,7 @@ impl Geometry {
     pub fn visible(&self, a: Vec3, b: Vec3) -> bool {
         self.planes.iter().all(|p| !p.blocks(a, b))
             && self.spheres.iter().all(|s| !s.blocks(a, b))
-            && self.harmonics.iter().all(|h| !h.blocks(a.as_dvec3(), b.as_dvec3()))
+            && self.harmonics.iter().all(|h| !h.blocks(a, b))
             && !self.mesh.blocks(a, b)
     }
 

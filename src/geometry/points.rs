@@ -21,7 +21,7 @@ pub struct Points {
     pub(super) far: Lanes,
     /// Of each plane, the points in front of it and those behind it.
     pub(super) sides: Vec<[Lanes; 2]>,
-    /// Of each sphere, the points inside.
+    /// Of each sphere, then of each star-shaped object, the points inside.
     pub(super) inside: Vec<Lanes>,
 }
 
@@ -61,6 +61,7 @@ impl Points {
         let sides = |p: &super::Plane| [where_true(&|q| p.height(q) > 0.0), where_true(&|q| p.height(q) < 0.0)];
         tile.sides = geometry.planes.iter().map(sides).collect();
         tile.inside = geometry.spheres.iter().map(|s| where_true(&|q| s.contains(q))).collect();
+        tile.inside.extend(geometry.harmonics.iter().map(|h| where_true(&|q| h.contains(q))));
         tile
     }
 

@@ -68,13 +68,8 @@ impl Geometry {
         for (sphere, inside) in self.spheres.iter().zip(&points.inside) {
             shadow_of_sphere(sphere, apex, points, inside, seen);
         }
-        for harmonic in &self.harmonics {
-            for (bundle, seen) in seen.iter_mut().enumerate() {
-                for lane in bits(u32::from(*seen)) {
-                    let blocked = harmonic.blocks(far, points.point(bundle, lane).as_dvec3());
-                    *seen &= !(u16::from(blocked) << lane);
-                }
-            }
+        for (harmonic, inside) in self.harmonics.iter().zip(&points.inside[self.spheres.len()..]) {
+            harmonic.shadow::<I>(apex, points, inside, seen, scratch);
         }
     }
 }
@@ -95,8 +90,9 @@ fn shadow_of_sphere(sphere: &Sphere, apex: Vec3, points: &Points, inside: &Lanes
 }
 
 impl Mesh {
+    /// Clears the bits of the points in `seen` between which and `apex` a triangle stands.
     #[inline(always)]
-    fn shadow<I: Isa>(&self, apex: Vec3, points: &Points, seen: &mut Lanes, scratch: &mut Scratch) {
+    pub(super) fn shadow<I: Isa>(&self, apex: Vec3, points: &Points, seen: &mut Lanes, scratch: &mut Scratch) {
         if !self.is_near(apex.as_dvec3()) {
             return self.shadow_one_by_one(apex, points, &[u16::MAX; BUNDLES], seen);
         }
