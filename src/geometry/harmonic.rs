@@ -207,6 +207,9 @@ fn normal_and_area(slope: &Slope, n0: DVec3) -> (DVec3, f64) {
     (across.normalize(), slope.value * across.length())
 }
 
+/// How far beyond a triangle the next is looked for, as a share of the segment.
+const NEXT: f64 = 1e-9;
+
 /// A star-shaped object in the world.
 #[derive(Clone)]
 pub struct Harmonic {
@@ -385,12 +388,35 @@ impl Harmonic {
         self.crosses(from, to)
     }
 
-    /// The same by the series alone.
+    /// The same by the series, wherever the segment is inside the outer mesh.
     fn crosses(&self, a: DVec3, b: DVec3) -> bool {
-        let (from, to) = (self.to_own * (a - self.center), self.to_own * (b - self.center));
-        let along = to - from;
-        let length = along.length();
-        length > 0.0 && self.star.first_crossing(from, along / length, length).is_some()
+        let whole = (b - a).length();
+        if whole == 0.0 {
+            return false;
+        }
+        let direction = (b - a) / whole;
+        let Some(shells) = &self.shells else { return self.crosses_between(a, direction, whole) };
+        let mut at = 0.0;
+        while at < whole {
+            let origin = a + at * direction;
+            let outer = shells.outer.closest_hit(&Ray { origin, direction }, whole - at);
+            let (enters, distance) = outer.map_or((false, whole - at), |hit| (hit.front, hit.distance));
+            // What is before an entrance is outside; what is before an exit, or the end, may not be.
+            if !enters && self.crosses_between(origin, direction, distance) {
+                return true;
+            }
+            // A little too far, so as to find no triangle twice: there is room between the mesh and the surface.
+            at += distance + NEXT * whole;
+        }
+        false
+    }
+
+    /// True when there is a point of the surface at most `end` from `from` along the unit vector `direction` \[m\].
+    fn crosses_between(&self, from: DVec3, direction: DVec3, end: f64) -> bool {
+        let own = self.to_own * direction;
+        let scale = own.length();
+        let origin = self.to_own * (from - self.center);
+        self.star.first_crossing(origin, own / scale, end * scale).is_some()
     }
 }
 
