@@ -3,8 +3,10 @@
 //! A part of a scene is known to its user by the name of a node; it is everything that hangs at that node or below.
 //! Four bytes a triangle and the names are all that is kept of the hierarchy once transforms are baked in.
 
+use crate::math::DMat4;
+
 /// A node of the scene.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Node {
     /// Its number in the file.
     pub index: usize,
@@ -12,10 +14,12 @@ pub struct Node {
     pub name: Option<String>,
     /// The node that it hangs at, as a place in [`Nodes::list`] before its own.
     pub parent: Option<u32>,
+    /// From its coordinates to those of the world.
+    pub world: DMat4,
 }
 
 /// All nodes, and the node of each triangle.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Nodes {
     /// Parents before children.
     pub list: Vec<Node>,

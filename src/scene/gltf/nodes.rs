@@ -40,7 +40,7 @@ impl Placed<'_> {
 
     /// What the scene remembers of the node.
     pub fn entry(&self) -> scene::Node {
-        scene::Node { index: self.index, name: self.node.name.clone(), parent: self.parent }
+        scene::Node { index: self.index, name: self.node.name.clone(), parent: self.parent, world: self.world }
     }
 
     /// Position of the node's origin \[m\].
