@@ -19,7 +19,7 @@ use crate::geometry::harmonic::Star;
 use crate::math::{DVec3, PI, atan2, sin_cos};
 
 /// Fewest and most directions; eight for each coefficient between.
-const DIRECTIONS: (usize, usize) = (40_000, 100_000);
+const DIRECTIONS: (usize, usize) = (40_000, 60_000);
 /// Most vertices from which distances are taken; of more, every second, third, ... one.
 const VERTICES: usize = 20_000;
 /// Projections on tangent planes, at most.
@@ -118,14 +118,14 @@ fn distance(star: &Star, p: DVec3) -> f64 {
     let mut least = f64::INFINITY;
     let mut direction = p.normalize_or(DVec3::Z);
     for _ in 0..PROJECTIONS {
-        let foot = star.series().value(direction) * direction;
-        let away = p - foot;
+        let slope = star.series().slope(direction);
+        let away = p - slope.value * direction;
         let length = away.length();
         if length >= least * (1.0 - 1e-6) {
             break;
         }
         least = length;
-        let (normal, _) = star.normal_and_area(direction);
+        let normal = (slope.value * direction - slope.gradient).normalize();
         direction = (p - away.dot(normal) * normal).normalize_or(direction);
     }
     least

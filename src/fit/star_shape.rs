@@ -58,6 +58,9 @@ pub fn centre(name: &str, solid: &Solid) -> Result<Centre> {
         return Err(refusal(name, solid, position));
     }
     let position = towards_the_middle(solid, position, KEPT * best);
+    // What rounding leaves of zero would only be digits in the file.
+    let nil = TOLERANCE * solid.diagonal;
+    let position = DVec3::select(position.abs().cmplt(DVec3::splat(nil)), DVec3::ZERO, position);
     let solid_angle: f64 = solid.faces.iter().map(|face| face.solid_angle(position)).sum();
     if (solid_angle / WHOLE - 1.0).abs() > 1e-6 {
         let allowed = "one layer around the centre: each ray from it meets the mesh once";
