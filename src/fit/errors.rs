@@ -24,6 +24,8 @@ const DIRECTIONS: (usize, usize) = (40_000, 60_000);
 const VERTICES: usize = 20_000;
 /// Projections on tangent planes, at most.
 const PROJECTIONS: usize = 20;
+/// Share of its length that a way has to lose for another projection.
+const GAIN: f64 = 1e-5;
 /// Part of a turn by which directions of the spiral follow each other: the golden section.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
@@ -115,18 +117,26 @@ fn spiral(i: usize, count: usize) -> DVec3 {
 
 /// Length of a shortest way from `p` to the surface \[m\].
 fn distance(star: &Star, p: DVec3) -> f64 {
-    let mut least = f64::INFINITY;
-    let mut direction = p.normalize_or(DVec3::Z);
-    for _ in 0..PROJECTIONS {
+    let foot = |direction: DVec3| {
         let slope = star.series().slope(direction);
         let away = p - slope.value * direction;
-        let length = away.length();
-        if length >= least * (1.0 - 1e-6) {
-            break;
-        }
-        least = length;
         let normal = (slope.value * direction - slope.gradient).normalize();
-        direction = (p - away.dot(normal) * normal).normalize_or(direction);
+        (away.length(), (p - away.dot(normal) * normal).normalize_or(direction))
+    };
+    let mut direction = p.normalize_or(DVec3::Z);
+    let (mut least, mut next) = foot(direction);
+    let mut step = 1.0;
+    for _ in 0..PROJECTIONS {
+        let tried = direction.lerp(next, step).normalize_or(direction);
+        let (length, after) = foot(tried);
+        if length < least * (1.0 - GAIN) {
+            (direction, least, next) = (tried, length, after);
+        } else if step > 0.25 {
+            // Over a strongly curved surface the foot on the tangent plane lies too far.
+            step *= 0.5;
+        } else {
+            return least.min(length);
+        }
     }
     least
 }
