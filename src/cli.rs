@@ -1,8 +1,11 @@
-//! Command line: run, plan, work, status, merge, validate. Types only; what they do is in `commands.rs`.
+//! Command line: run, plan, work, status, merge, fit, validate. Types only; what they do is in `commands.rs`.
 //!
 //! Flags say where and with how many processes; none of them changes a number. Only the job does.
 
 use clap::{Parser, Subcommand};
+use lampyris::fit::MAX_LANCZOS;
+use lampyris::geometry::harmonic::MAX_DEGREE;
+use lampyris::geometry::harmonic::file::Numbers;
 use std::path::PathBuf;
 
 /// Global illumination in absolute photometric units, every number with a confidence interval.
@@ -82,6 +85,28 @@ pub enum Command {
         #[arg(short, long, value_name = "OUT")]
         output: Option<PathBuf>,
     },
+    /// Fit spherical harmonics to a closed, star-shaped mesh, and say how far they are from it.
+    #[command(after_help = "Examples:\n  lampyris fit head.glb --node Head --degree 32 -o head.harmonic\n  \
+                      lampyris fit cube.obj --degree 32 --lanczos 1 --numbers f64 -o cube.harmonic")]
+    Fit {
+        /// A .glb, .gltf or .obj file.
+        mesh: PathBuf,
+        /// The node whose mesh is meant, in its own coordinates [default: the only one].
+        #[arg(long, value_name = "NAME")]
+        node: Option<String>,
+        /// Degree N of the series, 0 .. 128: (N + 1)^2 coefficients.
+        #[arg(long, value_name = "N", value_parser = degree)]
+        degree: usize,
+        /// How coefficients are stored: f32 or f64.
+        #[arg(long, value_name = "KIND", default_value = "f32", value_parser = numbers)]
+        numbers: Numbers,
+        /// Damp degree k by (sin(x)/x)^POWER, x = pi k/(N + 1): fewer ripples at creases, less exact elsewhere.
+        #[arg(long, value_name = "POWER", default_value = "0", value_parser = lanczos)]
+        lanczos: f64,
+        /// The file to write; a picture with .png instead of .harmonic goes beside it.
+        #[arg(short, long, value_name = "OUT.harmonic")]
+        output: PathBuf,
+    },
     /// Run cases with an exact answer and print reference, estimate, interval and z; exit code 1 if any fails.
     #[command(after_help = "Examples:\n  lampyris validate\n  lampyris validate --case sobolev/\n  \
                       lampyris validate --markdown --note 'Commit abc, two cores.'")]
@@ -96,6 +121,22 @@ pub enum Command {
         #[arg(long, value_name = "TEXT", requires = "markdown")]
         note: Option<String>,
     },
+}
+
+/// The degree of a series.
+fn degree(text: &str) -> Result<usize, String> {
+    text.parse().ok().filter(|&n| n <= MAX_DEGREE).ok_or_else(|| format!("allowed: 0 .. {MAX_DEGREE}"))
+}
+
+/// A way to store coefficients.
+fn numbers(text: &str) -> Result<Numbers, String> {
+    Numbers::ALL.into_iter().find(|n| n.name() == text).ok_or_else(|| "allowed: f32, f64".to_owned())
+}
+
+/// The power of the Lanczos factor.
+fn lanczos(text: &str) -> Result<f64, String> {
+    let allowed = || format!("allowed: 0 .. {MAX_LANCZOS}");
+    text.parse().ok().filter(|power| (0.0..=MAX_LANCZOS).contains(power)).ok_or_else(allowed)
 }
 
 /// A count of processes or threads: not zero, and not so many that they only hinder each other.

@@ -9,6 +9,7 @@ use lampyris::farm::merge::{goal_reached, merge};
 use lampyris::farm::plan::{Plan, human};
 use lampyris::farm::status::{Status, status};
 use lampyris::farm::worker::{self, Order};
+use lampyris::fit;
 use lampyris::geometry::simd;
 use lampyris::report;
 use lampyris::validate::{self, Found};
@@ -55,6 +56,10 @@ pub fn execute(command: Command) -> Result<Outcome> {
         Command::Work { dir, shard, threads, parent } => work(&dir, shard, threads, parent),
         Command::Status { dir, json } => show_status(&dir, json),
         Command::Merge { dirs, output } => merge_and_report(&dirs, output),
+        Command::Fit { mesh, node, degree, numbers, lanczos, output } => {
+            let text = fit::run(&fit::Request { mesh, node, degree, numbers, lanczos, output })?;
+            Ok(Outcome { text, exit: Exit::Done })
+        }
         Command::Validate { case, markdown, note } => validate(case.as_deref(), markdown.as_deref(), note.as_deref()),
     }
 }

@@ -58,6 +58,7 @@
 //! | 5 | [`transport`] | the equations: trajectories, direct light, connections | files, threads, shards, pictures |
 //! | 6 | [`farm`] | plan, worker processes, checkpoints, merge | files of results |
 //! | 7 | [`report`] | EXR, CSV, PNG, JSON | how the numbers were made |
+//! | 8 | [`fit`] | spherical harmonics fitted to a mesh, and their errors | light, jobs, histories |
 //! | 8 | [`validate`] | cases with an exact answer, run and judged | files, printing |
 //!
 //! The binary (`main`, `cli`, `commands`) joins farm and report. Reading order for the physics: [`transport`], then
@@ -82,4 +83,5 @@ pub mod farm;
 
 pub mod report;
 
+pub mod fit;
 pub mod validate;

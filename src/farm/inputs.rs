@@ -128,7 +128,10 @@ fn read_model(job_path: &Path, name: &str, files: &mut Vec<(Input, Vec<u8>)>) ->
 }
 
 /// A file that the scene at `path` refers to: below its folder, nowhere else.
-fn read_beside(path: &Path, scene: &str, uri: &str) -> Result<Vec<u8>> {
+///
+/// # Errors
+/// [`Error::Input`] for a path that leaves the folder, or a file that cannot be read.
+pub fn read_beside(path: &Path, scene: &str, uri: &str) -> Result<Vec<u8>> {
     let refused = |allowed: String| Error::input(scene, "uri", uri, allowed);
     let inside = Path::new(uri).components().all(|c| matches!(c, Component::Normal(_)));
     if uri.is_empty() || !inside {

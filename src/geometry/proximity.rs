@@ -2,7 +2,8 @@
 //!
 //! A surface point at distance d, at height h over the tangent plane of the receiver, on a triangle whose plane passes
 //! at distance p from the receiver, has G = cos cos'/d^2 = h p/d^4. The answer is conservative: "no" is a proof for
-//! the whole surface, "yes" may be a false alarm. Visibility is not looked at.
+//! the whole surface, "yes" may be a false alarm. Visibility is not looked at. The distance of the nearest triangle, for
+//! comparing surfaces, is found in the same way.
 
 use super::{Geometry, Harmonic, Mesh, Plane, Sphere};
 use crate::math::{DVec3, Vec3};
@@ -23,6 +24,11 @@ impl Geometry {
             || self.spheres.iter().any(|s| s.may_exceed(position, normal, bound))
             || self.harmonics.iter().any(|h| h.may_exceed(position, normal, bound))
             || self.mesh.may_exceed(position, normal, bound, floor)
+    }
+
+    /// Distance of the nearest triangle from `point`, or `limit` where none is nearer \[m\].
+    pub fn distance(&self, point: DVec3, limit: f64) -> f64 {
+        self.mesh.distance(point, limit)
     }
 
     /// Area of one side of a primitive \[m2\]; infinite for a plane.
@@ -83,6 +89,18 @@ impl Mesh {
         };
         let mut blocks = self.bvh.blocks_in(low, high);
         blocks.by_ref().take(PATIENCE).any(exceeds) || blocks.next().is_some()
+    }
+
+    fn distance(&self, point: DVec3, limit: f64) -> f64 {
+        // A box a little too large for the ball, so that rounding to f32 loses nothing of it.
+        let reach = limit * (1.0 + 1e-6) + 1e-6 * point.abs().max_element();
+        let blocks = self.bvh.blocks_in((point - reach).as_vec3(), (point + reach).as_vec3());
+        let triangles = blocks.flat_map(|block| &self.triangles[self.bvh.block(block)]);
+        let distances = triangles.map(|triangle| {
+            let [a, b, c] = triangle.corners.map(|corner| corner.as_dvec3() - point);
+            nearest_on_triangle(a, b, c).length()
+        });
+        distances.fold(limit, f64::min)
     }
 }
 

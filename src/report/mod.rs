@@ -43,10 +43,12 @@ mod stopping;
 mod summary;
 mod text;
 mod values;
+mod views;
 
 pub use number::short;
 pub use png::MAP_ORIGIN;
 pub use text::text_summary;
+pub use views::{View, write_views};
 
 use crate::error::{Error, Result};
 use crate::farm::durable::replace;

@@ -42,6 +42,12 @@ impl Scale {
         Scale { low, high, step, gradient, below, above }
     }
 
+    /// A linear scale from 0 to a round number that is not below `most`.
+    pub fn up_to(most: f64, gradient: Gradient) -> Self {
+        let (low, high, step) = linear_limits(0.0, most);
+        Scale { low, high, step, gradient, below: 0, above: 0 }
+    }
+
     /// Place of `value` on the scale, 0 at its low and 1 at its high end, cut off there.
     pub fn position(&self, value: f64) -> f64 {
         let place = if self.step.is_none() {

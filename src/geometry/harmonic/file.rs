@@ -30,7 +30,11 @@ pub enum Numbers {
 }
 
 impl Numbers {
-    fn name(self) -> &'static str {
+    /// Both.
+    pub const ALL: [Numbers; 2] = [Numbers::F32, Numbers::F64];
+
+    /// As it stands in a file.
+    pub fn name(self) -> &'static str {
         match self {
             Numbers::F32 => "f32",
             Numbers::F64 => "f64",
@@ -111,7 +115,7 @@ impl File {
             .filter(|&n| n <= MAX_DEGREE)
             .ok_or_else(|| bad("degree", degree, format!("0 ..= {MAX_DEGREE}")))?;
         let kind = field("numbers")?;
-        let numbers = [Numbers::F32, Numbers::F64].into_iter().find(|n| n.name() == kind);
+        let numbers = Numbers::ALL.into_iter().find(|n| n.name() == kind);
         let numbers = numbers.ok_or_else(|| bad("numbers", kind, "`f32` or `f64`".into()))?;
         if let Some(line) = lines.next() {
             return Err(bad("header", line, "no more lines".into()));
