@@ -4,7 +4,7 @@
 mod common;
 
 use common::scenes::bumpy_sphere;
-use lampyris::geometry::simd::{Isa, Kernel, Path};
+use lampyris::geometry::simd::Path;
 use lampyris::geometry::visibility::{BUNDLE, BUNDLES, Lanes, Points, Scratch, TILE};
 use lampyris::geometry::{Geometry, Mesh, Plane, Sphere, kd_order};
 use lampyris::math::{DMat3, DVec3, Vec3, cbrt, pow};
@@ -117,23 +117,6 @@ fn crosses_sphere(s: &Sphere, a: DVec3, b: DVec3) -> bool {
 
 // ------------------------------------------------------------------------------------------------ the kernel
 
-struct Shadow<'a> {
-    geometry: &'a Geometry,
-    apex: Vec3,
-    points: &'a Points,
-    seen: Lanes,
-}
-
-impl Kernel for Shadow<'_> {
-    type Output = Lanes;
-
-    #[inline(always)]
-    fn run<I: Isa>(mut self) -> Lanes {
-        self.geometry.shadow::<I>(self.apex, self.points, &mut self.seen, &mut Scratch::default());
-        self.seen
-    }
-}
-
 fn available() -> impl Iterator<Item = Path> {
     Path::ALL.into_iter().filter(|p| p.is_available())
 }
@@ -156,7 +139,8 @@ fn compare(name: &str, geometry: Geometry, brute: &Brute, apex: Vec3, points: &[
     for path in available() {
         geometry = geometry.with_path(path);
         let tile = Points::new(&geometry, points);
-        let seen = path.run(Shadow { geometry: &geometry, apex, points: &tile, seen: asked });
+        let mut seen = asked;
+        geometry.hide(apex, &tile, &mut seen, &mut Scratch::default());
         for (i, &point) in points.iter().enumerate() {
             let bit = |lanes: &Lanes| lanes[i / BUNDLE] >> (i % BUNDLE) & 1;
             let which = format!("{name}, {path:?}: point {i} of {}: {apex:?} to {point:?}", points.len());
@@ -457,7 +441,8 @@ fn keeps_in(closed: &Closed, tiles: usize) {
         for path in available() {
             geometry = geometry.with_path(path);
             let tile = Points::new(&geometry, &points);
-            let seen = path.run(Shadow { geometry: &geometry, apex, points: &tile, seen: [u16::MAX; BUNDLES] });
+            let mut seen: Lanes = [u16::MAX; BUNDLES];
+            geometry.hide(apex, &tile, &mut seen, &mut Scratch::default());
             assert_eq!(seen, [0; BUNDLES], "{name}, {path:?}: tile {i} leaks from {apex}");
         }
     }

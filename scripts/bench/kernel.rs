@@ -11,7 +11,7 @@ mod leaks;
 mod segments;
 
 use common::thread_time;
-use lampyris::geometry::simd::{Isa, Kernel, Path};
+use lampyris::geometry::simd::Path;
 use lampyris::geometry::visibility::{BUNDLE, BUNDLES, Lanes, Points, Scratch, TILE};
 use lampyris::geometry::{Geometry, Mesh, Ray, kd_order};
 use lampyris::math::Vec3;
@@ -68,7 +68,7 @@ fn bench(scene: Scene) {
             let mut seen = facing.clone();
             let start = thread_time();
             for (vertex, seen) in segments.vertices.iter().zip(&mut seen) {
-                path.run(Shadow { geometry: &geometry, apex: vertex.point, tiles: &tiles, seen });
+                shadow(&geometry, vertex.point, &tiles, seen);
             }
             rates[k].push(rate(traced, thread_time() - start));
             blocked.push(traced - seen.iter().map(|lanes| count(lanes)).sum::<u64>());
@@ -97,22 +97,10 @@ fn facing(vertex: &Place, receivers: &[Place]) -> Vec<Lanes> {
 }
 
 /// One vertex against all tiles.
-struct Shadow<'a> {
-    geometry: &'a Geometry,
-    apex: Vec3,
-    tiles: &'a [Points],
-    seen: &'a mut [Lanes],
-}
-
-impl Kernel for Shadow<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<I: Isa>(self) {
-        let mut scratch = Scratch::default();
-        for (tile, seen) in self.tiles.iter().zip(self.seen) {
-            self.geometry.shadow::<I>(self.apex, tile, seen, &mut scratch);
-        }
+fn shadow(geometry: &Geometry, apex: Vec3, tiles: &[Points], seen: &mut [Lanes]) {
+    let mut scratch = Scratch::default();
+    for (tile, seen) in tiles.iter().zip(seen) {
+        geometry.hide(apex, tile, seen, &mut scratch);
     }
 }
 

@@ -3,7 +3,7 @@
 
 use super::common::thread_time;
 use super::segments::{Scene, Triangle};
-use super::{Shadow, rate};
+use super::{rate, shadow};
 use lampyris::geometry::simd::Path;
 use lampyris::geometry::visibility::{BUNDLES, Points, TILE};
 use lampyris::geometry::{Geometry, Mesh};
@@ -61,7 +61,7 @@ impl Closed {
                 geometry = geometry.with_path(path);
                 let tiles = [Points::new(&geometry, &points)];
                 let mut seen = [[u16::MAX; BUNDLES]];
-                path.run(Shadow { geometry: &geometry, apex, tiles: &tiles, seen: &mut seen });
+                shadow(&geometry, apex, &tiles, &mut seen);
                 leaks += seen[0].iter().map(|lanes| u64::from(lanes.count_ones())).sum::<u64>();
             }
         }

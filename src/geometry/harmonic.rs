@@ -25,7 +25,7 @@ pub use series::{Bend, Bounds, MAX_DEGREE, Series, Slope, basis, projection};
 
 use super::bvh::Build;
 use super::mesh::{Mesh, bits};
-use super::simd::Isa;
+use super::simd::Path;
 use super::visibility::{BUNDLES, Lanes, Points, Scratch};
 use super::{Hit, Ray, hit};
 use crate::error::{Error, Result};
@@ -299,21 +299,20 @@ impl Harmonic {
         self
     }
 
+    /// Asks its meshes on `path`, where nobody else has them: for tests.
+    pub(super) fn set_path(&mut self, path: Path) {
+        if let Some(shells) = self.shells.as_mut().and_then(Arc::get_mut) {
+            (shells.inner.path, shells.outer.path) = (path, path);
+        }
+    }
+
     /// Clears the bits of the points in `seen` that `apex` does not see for this object; `inside` has those inside it.
-    #[inline(always)]
-    pub(super) fn shadow<I: Isa>(
-        &self,
-        apex: Vec3,
-        points: &Points,
-        inside: &Lanes,
-        seen: &mut Lanes,
-        scratch: &mut Scratch,
-    ) {
+    pub(super) fn hide(&self, apex: Vec3, points: &Points, inside: &Lanes, seen: &mut Lanes, scratch: &mut Scratch) {
         let mut undecided = *seen;
         if let Some(shells) = self.shells.as_ref().filter(|_| !self.contains(apex.as_dvec3())) {
             let (mut open, mut clear) = (*seen, *seen);
-            shells.inner.shadow::<I>(apex, points, &mut open, scratch);
-            shells.outer.shadow::<I>(apex, points, &mut clear, scratch);
+            shells.inner.hide(apex, points, &mut open, scratch);
+            shells.outer.hide(apex, points, &mut clear, scratch);
             for bundle in 0..BUNDLES {
                 // Between two points outside; the others are asked one by one.
                 let (one, inside) = (seen[bundle], inside[bundle]);
@@ -364,6 +363,14 @@ impl Harmonic {
         let normal = (self.to_own.transpose() * crossing.normal).normalize();
         let position = self.center + self.to_world * crossing.position;
         Some(hit(ray, skipped + crossing.distance / scale, position, normal))
+    }
+
+    /// How far along `ray` its surface is first met, by the series alone \[m\]: the twin that tests the meshes.
+    pub fn first_crossing(&self, ray: &Ray) -> Option<f64> {
+        let own = self.to_own * ray.direction;
+        let scale = own.length();
+        let origin = self.to_own * (ray.origin - self.center);
+        self.star.first_crossing(origin, own / scale, f64::INFINITY).map(|crossing| crossing.distance / scale)
     }
 
     /// How far along `ray` there is certainly nothing; `None` where it misses the object \[m\].

@@ -36,8 +36,7 @@ pub use plane::Plane;
 pub use sphere::Sphere;
 
 use crate::math::{DVec3, Vec3};
-use simd::{Isa, Kernel, Path};
-use visibility::{Lanes, Points, Scratch};
+use simd::Path;
 
 /// Lift of a surface point in units of its coordinate size.
 const LIFT: f64 = 16.0 / (1u64 << 24) as f64;
@@ -185,12 +184,6 @@ impl Geometry {
         best
     }
 
-    /// Clears the bits of the points in `seen` that `apex` does not see: [`Geometry::shadow`] with the instructions of the
-    /// processor, compiled once for all callers.
-    pub fn hide(&self, apex: Vec3, points: &Points, seen: &mut Lanes, scratch: &mut Scratch) {
-        self.path().run(Hide { geometry: self, apex, points, seen, scratch });
-    }
-
     /// How far points of bounded geometry are lifted \[m\]: thinner things cannot cast a shadow on what touches them.
     pub fn lift_length(&self) -> f64 {
         LIFT * self.extent
@@ -212,6 +205,7 @@ impl Geometry {
     /// The same geometry with its kernels on `path`, which the processor must have: for tests.
     pub fn with_path(mut self, path: Path) -> Self {
         self.mesh.path = path;
+        self.harmonics.iter_mut().for_each(|h| h.set_path(path));
         self
     }
 
@@ -227,24 +221,6 @@ impl Geometry {
             let hit = self.closest_hit(&Ray { origin: point, direction });
             hit.is_some_and(|h| !h.front && absorbs(&h))
         })
-    }
-}
-
-/// See [`Geometry::hide`].
-struct Hide<'a> {
-    geometry: &'a Geometry,
-    apex: Vec3,
-    points: &'a Points,
-    seen: &'a mut Lanes,
-    scratch: &'a mut Scratch,
-}
-
-impl Kernel for Hide<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<I: Isa>(self) {
-        self.geometry.shadow::<I>(self.apex, self.points, self.seen, self.scratch);
     }
 }
 

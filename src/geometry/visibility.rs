@@ -23,7 +23,7 @@ use super::mesh::{Mesh, bits};
 use super::planes::{Directions, Extent, Planes, Rows};
 use super::points::Corners;
 use super::shaft::Shaft;
-use super::simd::Isa;
+use super::simd::{Isa, Kernel};
 use super::{Geometry, Sphere};
 use crate::math::Vec3;
 use arrayvec::ArrayVec;
@@ -52,11 +52,8 @@ pub type Lanes = [u16; BUNDLES];
 
 impl Geometry {
     /// Clears the bits of the points in `seen` that `apex` does not see.
-    #[inline(always)]
-    pub fn shadow<I: Isa>(&self, apex: Vec3, points: &Points, seen: &mut Lanes, scratch: &mut Scratch) {
-        if !self.mesh.is_empty() {
-            self.mesh.shadow::<I>(apex, points, seen, scratch);
-        }
+    pub fn hide(&self, apex: Vec3, points: &Points, seen: &mut Lanes, scratch: &mut Scratch) {
+        self.mesh.hide(apex, points, seen, scratch);
         let far = apex.as_dvec3();
         for (plane, [front, behind]) in self.planes.iter().zip(&points.sides) {
             let height = plane.height(far);
@@ -69,12 +66,29 @@ impl Geometry {
             shadow_of_sphere(sphere, apex, points, inside, seen);
         }
         for (harmonic, inside) in self.harmonics.iter().zip(&points.inside[self.spheres.len()..]) {
-            harmonic.shadow::<I>(apex, points, inside, seen, scratch);
+            harmonic.hide(apex, points, inside, seen, scratch);
         }
     }
 }
 
-#[inline(always)]
+/// See [`Mesh::hide`].
+struct Hide<'a> {
+    mesh: &'a Mesh,
+    apex: Vec3,
+    points: &'a Points,
+    seen: &'a mut Lanes,
+    scratch: &'a mut Scratch,
+}
+
+impl Kernel for Hide<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<I: Isa>(self) {
+        self.mesh.shadow::<I>(self.apex, self.points, self.seen, self.scratch);
+    }
+}
+
 fn shadow_of_sphere(sphere: &Sphere, apex: Vec3, points: &Points, inside: &Lanes, seen: &mut Lanes) {
     let contained = sphere.contains(apex.as_dvec3());
     for (bundle, seen) in seen.iter_mut().enumerate() {
@@ -90,9 +104,16 @@ fn shadow_of_sphere(sphere: &Sphere, apex: Vec3, points: &Points, inside: &Lanes
 }
 
 impl Mesh {
-    /// Clears the bits of the points in `seen` between which and `apex` a triangle stands.
+    /// Clears the bits of the points in `seen` between which and `apex` a triangle stands, with the instructions of the processor:
+    /// compiled once for all callers.
+    pub(super) fn hide(&self, apex: Vec3, points: &Points, seen: &mut Lanes, scratch: &mut Scratch) {
+        if !self.is_empty() {
+            self.path.run(Hide { mesh: self, apex, points, seen, scratch });
+        }
+    }
+
     #[inline(always)]
-    pub(super) fn shadow<I: Isa>(&self, apex: Vec3, points: &Points, seen: &mut Lanes, scratch: &mut Scratch) {
+    fn shadow<I: Isa>(&self, apex: Vec3, points: &Points, seen: &mut Lanes, scratch: &mut Scratch) {
         if !self.is_near(apex.as_dvec3()) {
             return self.shadow_one_by_one(apex, points, &[u16::MAX; BUNDLES], seen);
         }

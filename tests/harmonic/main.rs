@@ -4,6 +4,7 @@
 mod objects;
 mod oracle;
 mod paper;
+mod shells;
 
 use lampyris::geometry::harmonic::{Series, Star, basis, projection};
 use lampyris::math::{DVec3, PI, sin_cos};

@@ -1,0 +1,89 @@
+//! What the meshes inside and outside of an object decide is what the series says, one segment at a time and in tiles, on
+//! every path; rays that use them meet the same points.
+
+use super::{generator, objects};
+use lampyris::geometry::harmonic::{Series, Star};
+use lampyris::geometry::simd::Path;
+use lampyris::geometry::visibility::{BUNDLE, BUNDLES, Lanes, Points, Scratch, TILE};
+use lampyris::geometry::{Geometry, Harmonic, Mesh, Ray};
+use lampyris::math::{DMat3, DVec3, Vec3};
+use lampyris::random::{Generator, sphere};
+
+/// A room around the object, which stands turned, stretched unevenly and mirrored.
+fn room(series: Series) -> (Geometry, Harmonic) {
+    let corner = |x: f32, y: f32, z: f32| Vec3::new(x, y, z);
+    let floor = [
+        [corner(-4.0, -4.0, -3.0), corner(4.0, -4.0, -3.0), corner(4.0, 4.0, -3.0)],
+        [corner(-4.0, -4.0, 3.0), corner(4.0, 4.0, 3.0), corner(-4.0, 4.0, 3.0)],
+    ];
+    let turned = DMat3::from_cols(DVec3::new(0.6, 0.8, 0.0), DVec3::new(0.96, -0.72, 0.0), DVec3::new(0.0, 0.0, 0.7));
+    let object = Harmonic::new(Star::new(series).unwrap(), DVec3::new(0.3, -0.2, 0.4), turned).unwrap();
+    (Geometry::new(Mesh::new(&floor), Vec::new(), Vec::new()).with_harmonics(vec![object.clone()]), object)
+}
+
+/// Whether the segment crosses the surface, by the series alone.
+fn crosses(object: &Harmonic, a: Vec3, b: Vec3) -> bool {
+    let (a, b) = (a.as_dvec3(), b.as_dvec3());
+    let length = (b - a).length();
+    object.first_crossing(&Ray { origin: a, direction: (b - a) / length }).is_some_and(|at| at < length)
+}
+
+/// A point in the room, a lifted point of the object, or one inside it.
+fn place(geometry: &Geometry, object: &Harmonic, rng: &mut Generator) -> Vec3 {
+    let (at, normal, _) = object.point(sphere(rng.uniform2()));
+    match (4.0 * rng.uniform()) as u32 {
+        0 => (0.3 * at + 0.7 * DVec3::new(0.3, -0.2, 0.4)).as_vec3(),
+        1 | 2 => geometry.lift(at, normal).as_vec3(),
+        _ => (2.5 * sphere(rng.uniform2())).as_vec3(),
+    }
+}
+
+#[test]
+fn segments_are_blocked_as_by_the_series_alone() {
+    for (name, series) in [("reference", objects::reference()), ("rough", objects::rough(16, &mut generator("rough")))]
+    {
+        let (mut geometry, object) = room(series);
+        let mut rng = generator(name);
+        let (mut blocked, mut count) = (0, 0);
+        for _ in 0..24 {
+            let apex = place(&geometry, &object, &mut rng);
+            let points: Vec<Vec3> = (0..TILE).map(|_| place(&geometry, &object, &mut rng)).collect();
+            let expected: Vec<bool> = points.iter().map(|&p| !crosses(&object, apex, p)).collect();
+            blocked += expected.iter().filter(|seen| !**seen).count();
+            count += TILE;
+            for path in Path::ALL.into_iter().filter(|p| p.is_available()) {
+                geometry = geometry.with_path(path);
+                let mut seen: Lanes = [u16::MAX; BUNDLES];
+                geometry.hide(apex, &Points::new(&geometry, &points), &mut seen, &mut Scratch::default());
+                for (i, (&p, &expected)) in points.iter().zip(&expected).enumerate() {
+                    assert_eq!(geometry.visible(apex, p), expected, "{name}: {apex} {p}");
+                    let in_tile = seen[i / BUNDLE] >> (i % BUNDLE) & 1 == 1;
+                    assert_eq!(in_tile, expected, "{name}, {path:?}, in a tile: {apex} {p}");
+                }
+            }
+        }
+        assert!(blocked > count / 5 && blocked < count * 4 / 5, "{name}: {blocked} of {count}");
+    }
+}
+
+#[test]
+fn rays_meet_what_the_series_alone_meets() {
+    let (geometry, object) = room(objects::rough(16, &mut generator("rough")));
+    let mut rng = generator("rays");
+    let mut met = 0;
+    for _ in 0..4000 {
+        let origin = place(&geometry, &object, &mut rng).as_dvec3();
+        let ray = Ray { origin, direction: sphere(rng.uniform2()) };
+        let exact = object.first_crossing(&ray);
+        match geometry.closest_hit(&ray).filter(|hit| hit.primitive == 2) {
+            Some(hit) => {
+                met += 1;
+                let cosine = hit.normal.dot(ray.direction).abs().max(1e-5);
+                assert!((hit.distance - exact.expect("it was met")).abs() < 1e-10 / cosine, "{hit:?} {exact:?}");
+                assert!((hit.position - (origin + hit.distance * ray.direction)).length() < 1e-9 / cosine);
+            }
+            None => assert!(exact.is_none(), "{exact:?} from {origin} along {}", ray.direction),
+        }
+    }
+    assert!(met > 1500, "{met}");
+}
