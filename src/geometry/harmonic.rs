@@ -222,11 +222,13 @@ pub struct Harmonic {
     shells: Option<Arc<Shelled>>,
 }
 
-/// Meshes that decide for most rays and segments between points outside: what crosses the inner one crosses the surface, what does
-/// not cross the outer one does not.
+/// Meshes that decide for most rays and segments between points outside: what crosses the inner one crosses the surface; what does
+/// not cross the outer one does not, where one end is outside of that too.
 struct Shelled {
     inner: Mesh,
     outer: Mesh,
+    /// Points at least so many times as far from the centre as the surface in their direction are outside of both.
+    reach: f64,
 }
 
 impl Harmonic {
@@ -280,6 +282,15 @@ impl Harmonic {
         self.star.contains(self.to_own * (p - self.center))
     }
 
+    /// True for points that may lie inside the outer mesh \[m\].
+    pub(super) fn is_near(&self, p: DVec3) -> bool {
+        let own = self.to_own * (p - self.center);
+        let reach = self.shells.as_ref().map_or(f64::INFINITY, |shells| shells.reach);
+        let length = own.length();
+        length < self.star.radii.0
+            || (length < self.star.radii.1 * reach && length < self.star.series.value(own / length) * reach)
+    }
+
     /// The same object with meshes inside and outside of it, for rays that come from anywhere in the box `around` \[m\].
     pub(super) fn shelled(mut self, around: (DVec3, DVec3)) -> Self {
         // Rounding to f32 moves a corner by half a unit of the largest coordinate; where a triangle is steep, that counts several times.
@@ -295,7 +306,8 @@ impl Harmonic {
             let triangles: Vec<_> = triangles.iter().map(|&t| turned(t).map(place)).collect();
             Mesh::within(&triangles, Build::Thorough, around)
         };
-        self.shells = Some(Arc::new(Shelled { inner: mesh(&shells.inner), outer: mesh(&shells.outer) }));
+        self.shells =
+            Some(Arc::new(Shelled { inner: mesh(&shells.inner), outer: mesh(&shells.outer), reach: shells.reach }));
         self
     }
 
@@ -306,18 +318,29 @@ impl Harmonic {
         }
     }
 
-    /// Clears the bits of the points in `seen` that `apex` does not see for this object; `inside` has those inside it.
-    pub(super) fn hide(&self, apex: Vec3, points: &Points, inside: &Lanes, seen: &mut Lanes, scratch: &mut Scratch) {
+    /// Clears the bits of the points in `seen` that `apex` does not see for this object, of which the points `inside` it, and those
+    /// near it, are known.
+    pub(super) fn hide(
+        &self,
+        apex: Vec3,
+        points: &Points,
+        [inside, near]: [&Lanes; 2],
+        seen: &mut Lanes,
+        scratch: &mut Scratch,
+    ) {
         let mut undecided = *seen;
-        if let Some(shells) = self.shells.as_ref().filter(|_| !self.contains(apex.as_dvec3())) {
+        let at = apex.as_dvec3();
+        if let Some(shells) = self.shells.as_ref().filter(|_| !self.contains(at)) {
+            let is_near = self.is_near(at);
             let (mut open, mut clear) = (*seen, *seen);
             shells.inner.hide(apex, points, &mut open, scratch);
             shells.outer.hide(apex, points, &mut clear, scratch);
             for bundle in 0..BUNDLES {
-                // Between two points outside; the others are asked one by one.
-                let (one, inside) = (seen[bundle], inside[bundle]);
+                // Inside the outer mesh both ends may see each other through the surface without crossing it.
+                let within = if is_near { near[bundle] } else { 0 };
+                let (asked, inside) = (seen[bundle], inside[bundle]);
                 seen[bundle] &= open[bundle] | inside;
-                undecided[bundle] = one & (inside | open[bundle] & !clear[bundle]);
+                undecided[bundle] = asked & (inside | open[bundle] & (!clear[bundle] | within));
             }
         }
         for (bundle, seen) in seen.iter_mut().enumerate() {
@@ -385,7 +408,8 @@ impl Harmonic {
     pub(super) fn blocks(&self, a: Vec3, b: Vec3) -> bool {
         let (from, to) = (a.as_dvec3(), b.as_dvec3());
         if let Some(shells) = self.shells.as_ref().filter(|_| !self.contains(from) && !self.contains(to)) {
-            if !shells.outer.blocks(a, b) {
+            let within = self.is_near(from) && self.is_near(to);
+            if !within && !shells.outer.blocks(a, b) {
                 return false;
             }
             if shells.inner.blocks(a, b) {

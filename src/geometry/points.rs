@@ -23,6 +23,8 @@ pub struct Points {
     pub(super) sides: Vec<[Lanes; 2]>,
     /// Of each sphere, then of each star-shaped object, the points inside.
     pub(super) inside: Vec<Lanes>,
+    /// Of each star-shaped object, the points inside or just outside.
+    pub(super) near: Vec<Lanes>,
 }
 
 impl Points {
@@ -39,6 +41,7 @@ impl Points {
             far: [0; BUNDLES],
             sides: Vec::new(),
             inside: Vec::new(),
+            near: Vec::new(),
         };
         for (i, &point) in points.iter().enumerate() {
             let (bundle, lane) = (i / BUNDLE, i % BUNDLE);
@@ -62,6 +65,7 @@ impl Points {
         tile.sides = geometry.planes.iter().map(sides).collect();
         tile.inside = geometry.spheres.iter().map(|s| where_true(&|q| s.contains(q))).collect();
         tile.inside.extend(geometry.harmonics.iter().map(|h| where_true(&|q| h.contains(q))));
+        tile.near = geometry.harmonics.iter().map(|h| where_true(&|q| h.is_near(q))).collect();
         tile
     }
 

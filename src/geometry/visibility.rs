@@ -65,8 +65,9 @@ impl Geometry {
         for (sphere, inside) in self.spheres.iter().zip(&points.inside) {
             shadow_of_sphere(sphere, apex, points, inside, seen);
         }
-        for (harmonic, inside) in self.harmonics.iter().zip(&points.inside[self.spheres.len()..]) {
-            harmonic.hide(apex, points, inside, seen, scratch);
+        let inside = &points.inside[self.spheres.len()..];
+        for (harmonic, (inside, near)) in self.harmonics.iter().zip(inside.iter().zip(&points.near)) {
+            harmonic.hide(apex, points, [inside, near], seen, scratch);
         }
     }
 }

@@ -60,6 +60,8 @@ pub(super) struct Shells {
     pub(super) inner: Vec<[DVec3; 3]>,
     /// No point of these is inside.
     pub(super) outer: Vec<[DVec3; 3]>,
+    /// No point of `outer` is farther from the centre than so many times the radius of the surface in its direction.
+    pub(super) reach: f64,
 }
 
 impl Shells {
@@ -82,7 +84,10 @@ impl Shells {
         };
         let is_inside = factors.iter().all(|f| f.0 > 0.0);
         let inner = if is_inside { moved(&|i| factors[i].0 * (1.0 - margin)) } else { Vec::new() };
-        Shells { inner, outer: moved(&|i| factors[i].1 * (1.0 + margin)) }
+        // Between corners with factors up to the greatest, q is at least the least.
+        let (least, most) = factors.iter().fold((f64::INFINITY, 0f64), |(l, h), f| (l.min(f.0), h.max(f.1)));
+        let reach = if least > 0.0 { most * (1.0 + margin) / least * (1.0 + margin) } else { f64::INFINITY };
+        Shells { inner, outer: moved(&|i| factors[i].1 * (1.0 + margin)), reach }
     }
 }
 
