@@ -308,12 +308,21 @@ fn sent<I: Isa, const C: usize>(
     w: &Triple<I::Sixteen>,
 ) -> ([I::Sixteen; C], I::Sixteen) {
     let one = I::Sixteen::splat(1.0);
-    let matt = (std::array::from_fn(|c| I::Sixteen::splat(vertex.intensity[c])), one);
-    let Some(glossy) = &vertex.glossy else { return matt };
+    let mut sent = [one; C];
+    for c in 0..C {
+        sent[c] = I::Sixteen::splat(vertex.intensity[c]);
+    }
+    let Some(glossy) = &vertex.glossy else { return (sent, one) };
     let reflectance = &scene.surface(glossy.primitive).reflectance;
-    let Some(law) = reflectance.lanes() else { return matt };
-    let through = std::array::from_fn(|c| I::Sixteen::splat(glossy.through[c]));
+    let Some(law) = reflectance.lanes() else { return (sent, one) };
+    let mut through = [one; C];
+    for c in 0..C {
+        through[c] = I::Sixteen::splat(glossy.through[c]);
+    }
     let f = law.evaluate::<I::Sixteen, C>(n, (&splat(glossy.from), &through), w);
     let peak = if reflectance.is_peaked() { weights_over_tolerated(&f) } else { one };
-    (std::array::from_fn(|c| f[c].mul(I::Sixteen::splat(glossy.weight[c]))), peak)
+    for c in 0..C {
+        sent[c] = f[c].mul(I::Sixteen::splat(glossy.weight[c]));
+    }
+    (sent, peak)
 }

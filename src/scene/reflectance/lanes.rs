@@ -147,10 +147,13 @@ impl LawInLanes {
 /// How many times the tolerated weight connections with these values of `f` have, at least 1.
 #[inline(always)]
 pub fn weights_over_tolerated<V: Vector, const C: usize>(f: &[V; C]) -> V {
-    let luminance = match C {
-        1 => f[0],
-        _ => (0..C).map(|c| f[c].mul(V::splat(REC709[c] as f32))).fold(V::splat(0.0), V::add),
-    };
+    let mut luminance = f[0];
+    if C > 1 {
+        luminance = f[0].mul(V::splat(REC709[0] as f32));
+        for c in 1..C {
+            luminance = luminance.add(f[c].mul(V::splat(REC709[c] as f32)));
+        }
+    }
     luminance.mul(V::splat((PI / PEAK) as f32)).max(V::splat(1.0))
 }
 
