@@ -10,10 +10,13 @@ const WIDTH: usize = 8;
 /// `columns`, each of `entries` numbers of eight bytes, packed.
 pub(super) fn pack(columns: &[u8], entries: usize) -> Vec<u8> {
     let mut planes = vec![0; columns.len()];
-    for (from, to) in columns.chunks_exact(WIDTH * entries.max(1)).zip(planes.chunks_exact_mut(WIDTH * entries.max(1)))
-    {
-        for (i, number) in from.as_chunks::<WIDTH>().0.iter().enumerate() {
-            number.iter().enumerate().for_each(|(plane, byte)| to[plane * entries + i] = *byte);
+    let column = WIDTH * entries.max(1);
+    let mut words = vec![0; entries];
+    for (from, to) in columns.chunks_exact(column).zip(planes.chunks_exact_mut(column)) {
+        words.iter_mut().zip(from.as_chunks().0).for_each(|(word, bytes)| *word = u64::from_le_bytes(*bytes));
+        // Plane by plane, so that the compiler takes many numbers at a time.
+        for (plane, to) in to.chunks_exact_mut(entries).enumerate() {
+            to.iter_mut().zip(&words).for_each(|(byte, word)| *byte = (word >> (8 * plane)) as u8);
         }
     }
     lz4_flex::block::compress(&planes)
@@ -27,11 +30,14 @@ pub(super) fn unpack(packed: &[u8], entries: usize, length: usize) -> Option<Vec
         return None;
     }
     let mut columns = vec![0; length];
-    for (from, to) in planes.chunks_exact(WIDTH * entries.max(1)).zip(columns.chunks_exact_mut(WIDTH * entries.max(1)))
-    {
-        for (i, number) in to.as_chunks_mut::<WIDTH>().0.iter_mut().enumerate() {
-            number.iter_mut().enumerate().for_each(|(plane, byte)| *byte = from[plane * entries + i]);
+    let column = WIDTH * entries.max(1);
+    let mut words = vec![0; entries];
+    for (from, to) in planes.chunks_exact(column).zip(columns.chunks_exact_mut(column)) {
+        words.fill(0);
+        for (plane, from) in from.chunks_exact(entries).enumerate() {
+            words.iter_mut().zip(from).for_each(|(word, byte)| *word |= u64::from(*byte) << (8 * plane));
         }
+        to.as_chunks_mut().0.iter_mut().zip(&words).for_each(|(bytes, word)| *bytes = word.to_le_bytes());
     }
     Some(columns)
 }
