@@ -208,6 +208,12 @@ fn mutate(bytes: &mut Vec<u8>, other: &[u8], draws: &mut Generator) {
     }
 }
 
+/// Writes a file anew: a file that is cut and written again is flushed to the disk by some systems, which takes long.
+fn put(path: &Path, bytes: &[u8]) {
+    fs::remove_file(path).unwrap();
+    fs::write(path, bytes).unwrap();
+}
+
 /// Demands what was written, or a refusal by name.
 #[track_caller]
 fn written_or_refused<T: PartialEq>(read: Result<T>, written: &T, case: usize) -> bool {
@@ -234,7 +240,7 @@ fn six_thousand_changed_checkpoints_are_refused() {
         for case in 0..2000 {
             let mut bytes = original.clone();
             mutate(&mut bytes, other, &mut draws);
-            fs::write(path, &bytes).unwrap();
+            put(path, &bytes);
             let read = bounded(bytes.len(), case, || content(path, &plan, *shard));
             let accepted = written_or_refused(read, &written, case);
             assert_eq!(accepted, bytes == *original, "case {case}");
@@ -289,7 +295,7 @@ fn three_thousand_forged_checkpoints_do_no_harm() {
                 let sections = [&sections[..range.start], &changed, &sections[range.end..]].concat();
                 framed(&postcard::to_stdvec(&header).unwrap(), &sections)
             };
-            fs::write(&path, &bytes).unwrap();
+            put(&path, &bytes);
             match bounded(bytes.len(), case, || content(&path, &plan, shard)) {
                 // Somebody who knows the checksums may write what he likes: that is for an audit to find.
                 Ok(_) => read_on += 1,
@@ -312,7 +318,7 @@ fn two_thousand_changed_plans_are_refused() {
     for case in 0..2000 {
         let mut bytes = original.clone();
         mutate(&mut bytes, JOB.as_bytes(), &mut draws);
-        fs::write(&path, &bytes).unwrap();
+        put(&path, &bytes);
         let read = bounded(bytes.len(), case, || folder.read_plan());
         assert_eq!(written_or_refused(read, &plan, case), bytes == original, "case {case}");
     }

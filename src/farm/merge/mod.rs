@@ -4,7 +4,7 @@
 //! copies count once and the order of the folders changes nothing; plans that ask for other results are refused. Shards that
 //! were compacted ([`compact`]) are the beginning of the fold, as it was stored.
 //! Files are read one after the other, a few blocks of bins at a time, and what does not fit into a fixed amount of memory is
-//! kept in a file without a name, so memory depends neither on the number of shards nor on the size of the pictures ([`fold`]).
+//! kept in a file without a name, so memory depends neither on the number of shards nor on the size of the pictures.
 //! Threads share the blocks of a file; every block is folded in shard order, so their number changes no bit. A file
 //! that cannot be trusted stops the merge and is named, with the reason. Merging knows neither
 //! scene nor random numbers.
