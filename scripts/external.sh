@@ -1,6 +1,6 @@
 #!/bin/bash
 # Tests that need programs beside the Rust toolchain: the EXR maps in OpenEXR's and OpenImageIO's own tools, and the same bits on
-# an old processor in qemu.
+# an old processor in qemu; disks that are full or read-only (needs root).
 # Installs what is missing (Debian); a tool that cannot be had is a failure.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -27,3 +27,4 @@ trap 'rm -rf "$folder"' EXIT
 target/release/lampyris run -q scripts/external/room.toml -o "$folder/room"
 scripts/external/check_exr.py "$folder/room"
 scripts/external/paths.sh target/release/lampyris "$folder"
+scripts/external/disk.sh target/release/lampyris "$folder"

@@ -16,9 +16,11 @@
 //! status        headers -> progress
 //! worker        computes one shard
 //! coordinator   starts, watches, restarts worker processes
-//! merge         checkpoints -> one result, in parallel
+//! merge         checkpoints -> one result, in parallel; the first of them -> one checkpoint
+//! audit         batches computed again, and compared with checkpoints
 //! ```
 
+pub mod audit;
 pub mod checkpoint;
 pub mod coordinator;
 mod degree;

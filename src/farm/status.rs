@@ -6,12 +6,14 @@
 //! Headers say which looks of a run with a goal have come, not what was seen there: that is for the one who asks
 //! to find out and to fill in ([`Status::judge`]).
 
-use super::checkpoint::{Header, read_header};
+use super::checkpoint::{Header, read_compaction, read_header};
 use super::folder::Folder;
 use super::plan::Plan;
 use crate::error::{Error, Result};
 use crate::tally::statistics::median;
 use serde::Serialize;
+use std::collections::BTreeMap;
+use std::ops::Range;
 use std::time::SystemTime;
 
 /// The progress of one shard.
@@ -89,36 +91,53 @@ pub enum Verdict {
     ReachedAt(u64),
 }
 
+/// The present \[s since 1970\].
+pub fn now() -> u64 {
+    SystemTime::UNIX_EPOCH.elapsed().map_or(0, |d| d.as_secs())
+}
+
 /// The progress of the plan in `folder`.
 ///
 /// # Errors
 /// Whatever reading the plan says; checkpoints that are refused are listed in the status instead.
 pub fn status(folder: &Folder) -> Result<Status> {
     let plan = folder.read_plan()?;
-    let (mut shards, mut refused) = (Vec::new(), Vec::new());
+    let (mut shards, mut refused) = (BTreeMap::new(), Vec::new());
+    let folded = kept(read_compaction(folder, &plan), &mut refused)?;
+    for (k, header) in (0..).zip(folded.iter().flat_map(|folded| folded.parts(&plan))) {
+        shards.insert(k, ShardStatus::new(&plan, k, &header));
+    }
     for (k, path) in folder.checkpoints()? {
-        match read_header(&path, &plan, k) {
-            Ok(Some(header)) => shards.push(ShardStatus::new(&plan, &header)),
-            Ok(None) => {}
-            Err(e @ Error::Refused { .. }) => refused.push(e.to_string()),
-            Err(e) => return Err(e),
+        if let Some(header) = kept(read_header(&path, &plan, k), &mut refused)? {
+            shards.entry(k).or_insert_with(|| ShardStatus::new(&plan, k, &header));
         }
     }
+    let shards = shards.into_values().collect();
     Ok(Status::new(&plan, shards, refused))
 }
 
+/// The header that was read; None, and why among `refused`, for a file that was refused.
+fn kept(read: Result<Option<Header>>, refused: &mut Vec<String>) -> Result<Option<Header>> {
+    match read {
+        Err(e @ Error::Refused { .. }) => {
+            refused.push(e.to_string());
+            Ok(None)
+        }
+        other => other,
+    }
+}
+
 impl ShardStatus {
-    /// From the header of a checkpoint.
-    pub fn new(plan: &Plan, header: &Header) -> Self {
-        let range = plan.shard(header.shard);
-        let now = SystemTime::UNIX_EPOCH.elapsed().map_or(0, |d| d.as_secs());
+    /// Of shard `k`, from the header of its checkpoint.
+    pub fn new(plan: &Plan, k: u64, header: &Header) -> Self {
+        let range = plan.shard(k);
         ShardStatus {
-            shard: header.shard,
+            shard: k,
             batches: header.batches(),
             of: range.end - range.start,
-            seconds: header.seconds,
-            age_seconds: now.saturating_sub(header.written),
-            host: header.host.clone(),
+            seconds: header.seconds(),
+            age_seconds: now().saturating_sub(header.written),
+            host: header.runs.last().map(|run| run.host.clone()).unwrap_or_default(),
             relative_error_estimate: finite(header.relative_error),
         }
     }
@@ -128,6 +147,12 @@ impl ShardStatus {
         let range = plan.shard(k);
         let (of, host) = (range.end - range.start, String::new());
         ShardStatus { shard: k, batches: 0, of, seconds: 0.0, age_seconds: 0, host, relative_error_estimate: None }
+    }
+
+    /// The range of its batches that are done.
+    pub fn done(&self, plan: &Plan) -> Range<u64> {
+        let start = plan.shard(self.shard).start;
+        start..start + self.batches
     }
 
     fn active(&self, checkpoint_seconds: f64) -> bool {
@@ -179,7 +204,7 @@ impl GoalStatus {
     /// From the progress of the shards of `plan`, in shard order; None without a goal.
     fn new(plan: &Plan, shards: &[ShardStatus]) -> Option<Self> {
         plan.job.stop.as_ref()?;
-        let last_look = plan.last_look(shards.iter().map(|s| (s.shard, s.batches)));
+        let last_look = plan.last_look(shards.iter().map(|s| s.done(plan)));
         let next_look = plan.looks().into_iter().find(|&look| Some(look) > last_look);
         let verdict = if last_look.is_some() { Verdict::Open } else { Verdict::NotReached };
         Some(GoalStatus { last_look, next_look, verdict })

@@ -38,6 +38,8 @@ pub enum Domain {
     Direction,
     /// Paths from the receivers of one receiver set; the index is `batch * bins + bin`.
     Reverse,
+    /// Batches that an audit computes again; the index is 0.
+    Audit,
 }
 
 impl Domain {
@@ -52,6 +54,7 @@ impl Domain {
             Domain::Emitter => "lampyris 1 emitter",
             Domain::Direction => "lampyris 1 direction",
             Domain::Reverse => "lampyris 1 reverse",
+            Domain::Audit => "lampyris 1 audit",
         }
     }
 }
