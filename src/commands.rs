@@ -12,6 +12,7 @@ use lampyris::farm::worker::{self, Order};
 use lampyris::fit;
 use lampyris::geometry::simd;
 use lampyris::report;
+use lampyris::scene::photometric_web::Photometry;
 use lampyris::validate::{self, Found};
 use std::fs::OpenOptions;
 use std::path::{Path, PathBuf};
@@ -60,6 +61,7 @@ pub fn execute(command: Command) -> Result<Outcome> {
             let text = fit::run(&fit::Request { mesh, node, degree, numbers, lanczos, output })?;
             Ok(Outcome { text, exit: Exit::Done })
         }
+        Command::Luminaire { file, output } => luminaire(&file, output),
         Command::Validate { case, markdown, note } => validate(case.as_deref(), markdown.as_deref(), note.as_deref()),
     }
 }
@@ -146,6 +148,20 @@ fn merge_and_report(dirs: &[PathBuf], output: Option<PathBuf>) -> Result<Outcome
     let exit = if merged.missing.is_empty() { Exit::Done } else { Exit::Incomplete };
     let text = format!("{}results in {}\n", report::text_summary(&plan, &merged), output.display());
     Ok(Outcome { text, exit })
+}
+
+/// Says what a photometric file holds, and draws its polar curves.
+fn luminaire(file: &Path, output: Option<PathBuf>) -> Result<Outcome> {
+    let name = file.display().to_string();
+    let bytes = std::fs::read(file)
+        .map_err(|e| Error::input("command line", "FILE", &name, format!("an IES or EULUMDAT file ({e})")))?;
+    let photometry = Photometry::parse(&name, &bytes)?;
+    let stem = file.file_stem().unwrap_or_default();
+    let picture = output.unwrap_or_else(|| Path::new(".").join(stem).with_extension("png"));
+    let title = file.file_name().unwrap_or_default().to_string_lossy();
+    report::write_polar(&picture, &title, &photometry)?;
+    let text = format!("{}curves in {}\n", report::luminaire_text(&photometry), picture.display());
+    Ok(Outcome { text, exit: Exit::Done })
 }
 
 /// Runs the cases, shows each as soon as it is done, and writes the document `markdown` if one is wanted.

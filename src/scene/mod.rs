@@ -5,7 +5,9 @@
 //! source in proportion to flux. A scene does not know receivers, seeds or files.
 
 pub mod gltf;
+mod luminaires;
 mod nodes;
+pub mod photometric_web;
 mod reflectance;
 mod replace;
 mod source;
@@ -66,7 +68,7 @@ pub struct Model {
     pub surfaces: Vec<Surface>,
     /// The nodes at which the triangles hang.
     pub nodes: Nodes,
-    /// Point, spot and directional lights.
+    /// Lights without extent.
     pub lights: Vec<Light>,
     /// Cameras.
     pub cameras: Vec<CameraNode>,
@@ -142,7 +144,7 @@ impl Scene {
         nodes.of_replacements = (surface_of.len() as u32, model.replacements.iter().map(|r| r.node).collect());
         surface_of.extend(model.replacements.iter().map(|r| r.surface));
         let emitters = emitters(&geometry, &surfaces, &surface_of);
-        let lights = model.lights.into_iter().chain(job.sources.iter().map(light));
+        let lights = model.lights.into_iter().chain(job.sources.iter().map(Light::of_job));
         let lights: Vec<Light> = lights.map(|l| l.moved(offset).recoloured(paint)).collect();
         refuse_endless_flux(&geometry, &lights)?;
         let given = lights.len();
@@ -281,14 +283,6 @@ fn spheres(job: &Job, offset: DVec3) -> Vec<Sphere> {
 
 fn planes(job: &Job, offset: DVec3) -> Vec<Plane> {
     job.planes.iter().map(|p| Plane::new(DVec3::from(p.point) + offset, p.normal.into())).collect()
-}
-
-fn light(source: &job::Source) -> Light {
-    match *source {
-        job::Source::Omni { position, intensity } => {
-            Light::Omni { position: position.into(), intensity: Colour::grey(intensity) }
-        }
-    }
 }
 
 /// The area lights: one for each triangle of an emissive surface.

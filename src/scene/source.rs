@@ -3,8 +3,9 @@
 //! A history chooses its source in proportion to luminous flux and leaves it with the exact distribution of its
 //! emission, so every history starts with the same luminous weight: the flux of all sources together.
 
+use super::photometric_web::Luminaire;
 use crate::geometry::Geometry;
-use crate::math::{DVec3, PI, cbrt, cos, to_world};
+use crate::math::{DVec3, PI, cbrt, cos, pow, to_world};
 use crate::photometry::Colour;
 use crate::random::{Generator, around_z, cosine_hemisphere, disc, sphere};
 
@@ -31,6 +32,19 @@ pub enum Light {
         /// Half angle outside which it is zero \[rad\].
         outer: f64,
     },
+    /// Intensity times a power of the cosine to the axis, in the hemisphere around it.
+    CosPower {
+        /// Position \[m\].
+        position: DVec3,
+        /// Unit vector along the axis.
+        direction: DVec3,
+        /// Luminous intensity on the axis \[cd\].
+        intensity: Colour,
+        /// The power.
+        exponent: f64,
+    },
+    /// The photometric web of a file.
+    Luminaire(Luminaire),
     /// Parallel light.
     Directional {
         /// Unit vector of propagation.
@@ -48,15 +62,23 @@ impl Light {
             Light::Spot { position, direction, intensity, inner, outer } => {
                 Light::Spot { position: position + offset, direction, intensity, inner, outer }
             }
+            Light::CosPower { position, direction, intensity, exponent } => {
+                Light::CosPower { position: position + offset, direction, intensity, exponent }
+            }
+            Light::Luminaire(luminaire) => Light::Luminaire(luminaire.moved(offset)),
             directional @ Light::Directional { .. } => directional,
         }
     }
 
     /// The same light with its colour through `f`.
     pub(super) fn recoloured(mut self, f: impl Fn(Colour) -> Colour) -> Self {
-        let (Light::Omni { intensity: colour, .. }
-        | Light::Spot { intensity: colour, .. }
-        | Light::Directional { illuminance: colour, .. }) = &mut self;
+        let colour = match &mut self {
+            Light::Omni { intensity, .. } | Light::Spot { intensity, .. } | Light::CosPower { intensity, .. } => {
+                intensity
+            }
+            Light::Luminaire(luminaire) => luminaire.factor_mut(),
+            Light::Directional { illuminance, .. } => illuminance,
+        };
         *colour = f(*colour);
         self
     }
@@ -66,6 +88,8 @@ impl Light {
         match self {
             Light::Omni { intensity, .. } => *intensity * (4.0 * PI),
             Light::Spot { intensity, inner, outer, .. } => *intensity * Falloff::new(*inner, *outer).solid_angle(),
+            Light::CosPower { intensity, exponent, .. } => *intensity * (2.0 * PI / (exponent + 1.0)),
+            Light::Luminaire(luminaire) => luminaire.flux(),
             Light::Directional { illuminance, .. } => *illuminance * (PI * radius * radius),
         }
     }
@@ -77,13 +101,18 @@ impl Light {
             let way = point - position;
             (Some(position), way.normalize(), intensity / way.length_squared())
         };
-        match *self {
-            Light::Omni { position, intensity } => from(position, intensity),
+        match self {
+            Light::Omni { position, intensity } => from(*position, *intensity),
             Light::Spot { position, direction, intensity, inner, outer } => {
-                let cosine = direction.dot((point - position).normalize());
-                from(position, intensity * Falloff::new(inner, outer).at(cosine))
+                let cosine = direction.dot((point - *position).normalize());
+                from(*position, *intensity * Falloff::new(*inner, *outer).at(cosine))
             }
-            Light::Directional { direction, illuminance } => (None, direction, illuminance),
+            Light::CosPower { position, direction, intensity, exponent } => {
+                let cosine = direction.dot((point - *position).normalize());
+                from(*position, *intensity * if cosine > 0.0 { pow(cosine, *exponent) } else { 0.0 })
+            }
+            Light::Luminaire(luminaire) => from(luminaire.position, luminaire.intensity(point - luminaire.position)),
+            Light::Directional { direction, illuminance } => (None, *direction, *illuminance),
         }
     }
 }
@@ -269,6 +298,11 @@ impl Sources {
                 let cosine = Falloff::new(*inner, *outer).sample(u.x);
                 (*position, to_world(*direction, around_z(cosine, u.y)))
             }
+            Light::CosPower { position, direction, exponent, .. } => {
+                let cosine = pow(1.0 - u.x, 1.0 / (exponent + 1.0));
+                (*position, to_world(*direction, around_z(cosine, u.y)))
+            }
+            Light::Luminaire(luminaire) => (luminaire.position, luminaire.sample(u)),
             Light::Directional { direction, .. } => {
                 let across = disc(u) * radius;
                 let start = DVec3::new(across.x, across.y, -2.0 * radius);

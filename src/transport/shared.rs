@@ -18,6 +18,7 @@ use crate::math::{DVec2, DVec3, Vec3};
 use crate::photometry::Colour;
 use crate::random::Generator;
 use crate::random::sobol::PointSet;
+use crate::scene::photometric_web::Luminaire;
 use crate::scene::{Emitter, Light, Scene};
 use std::ops::Range;
 
@@ -136,7 +137,10 @@ fn of_lights(scene: &Scene, receivers: &[Receiver]) -> Vec<Colour> {
         }
         match light {
             Light::Directional { direction, .. } => shadow_of_parallel(scene, *direction, receivers, &mut seen),
-            Light::Omni { position, .. } | Light::Spot { position, .. } => {
+            Light::Omni { position, .. }
+            | Light::Spot { position, .. }
+            | Light::CosPower { position, .. }
+            | Light::Luminaire(Luminaire { position, .. }) => {
                 scene.geometry.hide(position.as_vec3(), &points, &mut seen, &mut Scratch::default());
             }
         }

@@ -164,7 +164,11 @@ impl Plan {
             spheres,
             sources,
         };
-        let bytes = postcard::to_stdvec(&content).expect("plain data of known length always has a postcard form");
+        let mut bytes = postcard::to_stdvec(&content).expect("plain data of known length always has a postcard form");
+        // Behind the rest, and nothing without luminaires: jobs that have none keep their digests.
+        if !self.job.luminaires.is_empty() {
+            bytes.extend(serde_json::to_vec(&self.job.luminaires).expect("plain data always has a JSON form"));
+        }
         blake3::hash(&bytes)
     }
 
