@@ -157,7 +157,9 @@ fn luminaire(file: &Path, output: Option<PathBuf>) -> Result<Outcome> {
         .map_err(|e| Error::input("command line", "FILE", &name, format!("an IES or EULUMDAT file ({e})")))?;
     let photometry = Photometry::parse(&name, &bytes)?;
     let stem = file.file_stem().unwrap_or_default();
-    let picture = output.unwrap_or_else(|| Path::new(".").join(stem).with_extension("png"));
+    let picture = output.unwrap_or_else(|| Path::new(stem).with_extension("png"));
+    // A bare name has an empty parent, which is no folder that can be opened.
+    let picture = if picture.parent() == Some(Path::new("")) { Path::new(".").join(picture) } else { picture };
     let title = file.file_name().unwrap_or_default().to_string_lossy();
     report::write_polar(&picture, &title, &photometry)?;
     let text = format!("{}curves in {}\n", report::luminaire_text(&photometry), picture.display());

@@ -17,14 +17,17 @@ pub fn luminaire_text(photometry: &Photometry) -> String {
 /// Angles, symmetry, shape and factors.
 fn of_table(photometry: &Photometry) -> Vec<(&'static str, String)> {
     let measured = &photometry.measured;
-    let range = |list: &[f64]| format!("{}, {} .. {}", list.len(), label(list[0]), label(list[list.len() - 1]));
+    let range = |list: &[f64]| match list {
+        [only] => format!("1, {}", label(*only)),
+        _ => format!("{}, {} .. {}", list.len(), label(list[0]), label(list[list.len() - 1])),
+    };
     let (planes, angles) = (range(&measured.planes), range(&measured.angles));
     let mut rows = vec![
         ("planes", format!("{planes} degrees")),
         ("angles", format!("{angles} degrees")),
         ("symmetry", symmetry(photometry.symmetry)),
         ("opening", opening(&photometry.opening)),
-        ("factor", format!("{} on the numbers of the table", short(photometry.factor, 6))),
+        ("factor", format!("{} on the numbers of the table", label(photometry.factor))),
     ];
     if let Some(tilt) = &photometry.tilt {
         let lamp = match tilt.lamp {
@@ -56,7 +59,7 @@ fn of_light(photometry: &Photometry) -> Vec<(&'static str, String)> {
     }
     if photometry.watts > 0.0 {
         let efficacy = short(flux / photometry.watts, 4);
-        rows.push(("power", format!("{} W, {efficacy} lm/W", short(photometry.watts, 6))));
+        rows.push(("power", format!("{} W, {efficacy} lm/W", label(photometry.watts))));
     }
     let (t, p) = photometry.web.brightest();
     let (t, p) = (t * 180.0 / PI, (p * 180.0 / PI).rem_euclid(360.0));

@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::farm::durable::replace;
 use crate::math::{DMat3, DVec3, PI, atan2, sin_cos};
 use crate::photometry::Colour;
-use crate::scene::photometric_web::{Luminaire, Photometry, Placement};
+use crate::scene::photometric_web::{Luminaire, Photometry, Placement, Symmetry};
 use std::path::Path;
 
 const WIDTH: u32 = 680;
@@ -61,7 +61,10 @@ fn draw_web(canvas: &mut Canvas, scale: &Scale) {
         let circle: Vec<_> = turn().map(|angle| place(angle, share)).collect();
         canvas.stroke(&circle, 1.0, GREY);
         let [x, y] = place(PI, share);
-        canvas.text([x as u32 + 4, y as u32 + 2], &label(tick), Font::Small);
+        if share > 0.0 {
+            let unit = if share < 1.0 { "" } else { " cd" };
+            canvas.text([x as u32 + 4, y as u32 + 2], &format!("{}{unit}", label(tick)), Font::Small);
+        }
     }
     for k in 0..12 {
         let angle = PI * f64::from(k) / 6.0;
@@ -71,11 +74,13 @@ fn draw_web(canvas: &mut Canvas, scale: &Scale) {
         let (wide, tall) = (Font::Small.width(&text), Font::Small.height());
         canvas.text([x as u32 - wide / 2, y as u32 - tall / 2], &text, Font::Small);
     }
-    canvas.text([MIDDLE[0] as u32 + 8, (MIDDLE[1] - RADIUS) as u32 - 34], "cd", Font::Small);
 }
 
 /// Azimuths of the planes to draw \[rad\].
 fn planes(photometry: &Photometry, luminaire: &Luminaire) -> Vec<f64> {
+    if photometry.symmetry == Symmetry::Axial {
+        return vec![0.0];
+    }
     let (t, p) = photometry.web.brightest();
     let brightest = luminaire.direction(t, p);
     let (x, y) = (brightest.x, -brightest.z);

@@ -139,7 +139,7 @@ impl<'a> Sheet<'a> {
     /// The planes whose intensities are in the file, of `all` from line `first` on.
     fn planes(&self, symmetry: usize, first: usize, all: usize) -> Result<Vec<f64>> {
         let divisor = [1, 1, 2, 4, 4][symmetry];
-        if all % divisor != 0 {
+        if !all.is_multiple_of(divisor) {
             let allowed = format!("a multiple of {divisor} with symmetry {symmetry}");
             return Err(self.name.bad(4, "number of C-planes", all, allowed));
         }
