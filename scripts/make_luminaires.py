@@ -105,8 +105,8 @@ def main():
     down, whole, full = steps(0, 90, 15), steps(0, 180, 15), steps(0, 360, 30)
     # Symmetries.
     lm63("omni_1000lm", [0], [0, 90, 180], lambda c, g: 79.57747154594767, lumens=1000)
-    lm63("lambert_100lm", [0], steps(0, 90, 5), lambda c, g: round(31.830988618379067 * math.cos(math.radians(g)), 9) + 0.0, lumens=100,
-         size=(-0.2, -0.2, 0))
+    lm63("lambert_100lm", [0], steps(0, 90, 0.5), lambda c, g: round(31.830988618379067 * math.cos(math.radians(g)), 9) + 0.0,
+         lumens=100, size=(-0.2, -0.2, 0))
     lm63("quadrant", steps(0, 90, 15), whole, quarter)
     lm63("half_0_180", steps(0, 180, 30), whole, other_half)
     lm63("half_90_270", steps(90, 270, 30), whole, half, first="IESNA:LM-63-1995")
@@ -132,6 +132,10 @@ def main():
     lm63("feet", [0], down, lambda c, g: 100, unit=1, size=(2, 4, 0.5))
     lm63("round_1995", [0], down, lambda c, g: 100, first="IESNA:LM-63-1995", size=(-0.3, 0, 0))
     lm63("sphere_2002", [0], whole, lambda c, g: 100, size=(-0.4, -0.4, -0.4))
+    for name, size in [("rectangle", (0.3, 0.6, 0)), ("box", (0.2, 0.4, 0.1)), ("cylinder_upright", (-0.2, -0.2, 0.3)),
+                       ("cylinder_along_c0", (-0.1, 0.6, -0.1)), ("cylinder_across_c0", (0.6, -0.1, -0.1)), ("sphere", (-0.3, -0.3, -0.3)),
+                       ("disc", (-0.3, -0.2, 0))]:
+        lm63(f"opening_{name}", full, whole, shape, size=size)
     # Text.
     lm63("commas_between", full, whole, shape, change=lambda x: x.replace(" ", ", ").replace("[LUMINAIRE],", "[LUMINAIRE]"))
     lm63("commas_as_points", full, whole, shape, change=lambda x: "\n".join(

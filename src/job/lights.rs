@@ -73,9 +73,23 @@ pub struct Luminaire {
     /// Another, 0 ..= 1.
     #[serde(default = "one")]
     pub dimming: f64,
+    /// What shines: a point, or the luminous opening that the file describes.
+    #[serde(default)]
+    pub extent: Extent,
     /// Flux to which the web is scaled before the two factors \[lm\]; left out: as the file has it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub flux: Option<f64>,
+}
+
+/// What of a luminaire shines.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Extent {
+    /// A point: right from some five times its size on.
+    #[default]
+    Point,
+    /// The opening in the file, with the luminance that its intensities ask for.
+    Opening,
 }
 
 fn down() -> [f64; 3] {

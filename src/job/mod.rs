@@ -8,7 +8,7 @@ mod lights;
 mod receivers;
 mod replacement;
 
-pub use lights::{Luminaire, Source};
+pub use lights::{Extent, Luminaire, Source};
 pub use receivers::{Camera, Gonio, Grid, Kept, Point, ReceiverKind, Region, SetShape, View};
 pub use replacement::{Degree, DegreeWord, Replacement};
 

@@ -1,7 +1,7 @@
 //! The lights of a job, hung into the scene.
 
 use super::photometric_web::{Luminaire, Photometry, Placement};
-use super::{Light, Model};
+use super::{Extended, Light, Model, Reflectance, Surface};
 use crate::error::{Error, Result};
 use crate::job;
 use crate::math::{DMat3, DMat4, DVec3, PI};
@@ -67,8 +67,33 @@ impl Model {
             self.warn(format!("luminaire {}: its web of {own:.1} lm is scaled to {flux:.1} lm", luminaire.file));
         }
         let factor = Colour::grey(scale * luminaire.multiplier * luminaire.dimming);
-        self.lights.push(Light::Luminaire(Luminaire::new(photometry, &placement, factor)));
+        let light = Luminaire::new(photometry, &placement, factor);
+        match luminaire.extent {
+            job::Extent::Point => self.lights.push(Light::Luminaire(light)),
+            job::Extent::Opening => {
+                let extended = Extended::new(light, &photometry.opening, &placement).ok_or_else(|| {
+                    let allowed = "point: its file gives no luminous opening";
+                    Error::input(job, format!("{at}.extent"), "opening", allowed)
+                })?;
+                self.add_faces(extended);
+            }
+        }
         Ok(())
+    }
+
+    /// Adds a luminaire with extent, whose faces absorb what meets them.
+    fn add_faces(&mut self, extended: Extended) {
+        let surface = self.surfaces.len() as u32;
+        for face in &extended.faces {
+            let first = self.positions.len() as u32;
+            self.positions.extend(face);
+            self.triangles.push([first, first + 1, first + 2]);
+            self.surface_of.push(surface);
+        }
+        let reflectance = Reflectance::Lambert(Colour::BLACK);
+        let (name, double_sided) = ("luminous opening".to_owned(), extended.flat);
+        self.surfaces.push(Surface { name, reflectance, double_sided, emission: Colour::BLACK });
+        self.extended.push(extended);
     }
 
     /// From the coordinates of the one node called `name` to those of the world.

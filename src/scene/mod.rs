@@ -7,12 +7,14 @@
 pub mod gltf;
 mod luminaires;
 mod nodes;
+mod panel;
 pub mod photometric_web;
 mod reflectance;
 mod replace;
 mod source;
 
 pub use nodes::{Node, Nodes};
+pub use panel::{Extended, Panel};
 pub use reflectance::{LawInLanes, Reflectance, Scattered, weight_over_tolerated, weights_over_tolerated};
 pub use source::{Emission, Emitter, Light, Sources};
 
@@ -70,6 +72,8 @@ pub struct Model {
     pub nodes: Nodes,
     /// Lights without extent.
     pub lights: Vec<Light>,
+    /// Luminaires with extent, whose faces are the last of the triangles, in this order.
+    pub extended: Vec<Extended>,
     /// Cameras.
     pub cameras: Vec<CameraNode>,
     /// Star-shaped objects in the place of meshes.
@@ -148,7 +152,17 @@ impl Scene {
         let lights: Vec<Light> = lights.map(|l| l.moved(offset).recoloured(paint)).collect();
         refuse_endless_flux(&geometry, &lights)?;
         let given = lights.len();
-        let sources = Sources::new(lights, emitters, geometry.bounding_sphere());
+        let mut first = model.triangles.len() - model.extended.iter().map(|e| e.faces.len()).sum::<usize>();
+        let panel = |mut extended: Extended| {
+            extended.luminaire = extended.luminaire.moved(offset);
+            let colour = extended.luminaire.factor_mut();
+            *colour = paint(*colour);
+            let faces = first as u32;
+            first += extended.faces.len();
+            Panel::new(extended, &geometry, faces)
+        };
+        let panels = model.extended.into_iter().map(panel).collect();
+        let sources = Sources::new(lights, emitters, panels, geometry.bounding_sphere());
         let mut warnings = model.warnings;
         if sources.lights.len() < given {
             let dark = given - sources.lights.len();
@@ -196,6 +210,14 @@ impl Scene {
     /// The surface of a primitive.
     pub fn surface(&self, primitive: u32) -> &Surface {
         &self.surfaces[self.surface_of[primitive as usize] as usize]
+    }
+
+    /// Luminance that a surface emits where `hit`, towards the unit vector `w` \[cd/m2\]; of its lit side.
+    pub fn emitted(&self, hit: &Hit, w: DVec3) -> Colour {
+        match self.sources.panel_face(hit.primitive) {
+            Some((panel, _)) => panel.luminance(w),
+            None => self.surface(hit.primitive).emission,
+        }
     }
 
     /// Number of primitives: triangles, spheres, planes.
@@ -290,16 +312,7 @@ fn emitters(geometry: &Geometry, surfaces: &[Surface], surface_of: &[u32]) -> Ve
     let lit = |primitive: &usize| !surfaces[surface_of[*primitive] as usize].emission.is_black();
     let emitter = |primitive: usize| {
         let surface = &surfaces[surface_of[primitive] as usize];
-        let [a, b, c] = geometry.triangle(primitive as u32);
-        let across = (b - a).cross(c - a);
-        Emitter {
-            primitive: primitive as u32,
-            corners: [a, b, c],
-            normal: across.normalize_or_zero(),
-            area: 0.5 * across.length(),
-            luminance: surface.emission,
-            double_sided: surface.double_sided,
-        }
+        Emitter::of_triangle(geometry, primitive as u32, surface.emission, surface.double_sided)
     };
     (0..surface_of.len()).filter(lit).map(emitter).collect()
 }

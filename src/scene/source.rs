@@ -3,6 +3,7 @@
 //! A history chooses its source in proportion to luminous flux and leaves it with the exact distribution of its
 //! emission, so every history starts with the same luminous weight: the flux of all sources together.
 
+use super::panel::Panel;
 use super::photometric_web::Luminaire;
 use crate::geometry::Geometry;
 use crate::math::{DVec3, PI, cbrt, cos, pow, to_world};
@@ -181,6 +182,14 @@ pub struct Emitter {
 }
 
 impl Emitter {
+    /// The triangle `primitive` of `geometry`.
+    pub(super) fn of_triangle(geometry: &Geometry, primitive: u32, luminance: Colour, double_sided: bool) -> Self {
+        let [a, b, c] = geometry.triangle(primitive);
+        let across = (b - a).cross(c - a);
+        let (normal, area) = (across.normalize_or_zero(), 0.5 * across.length());
+        Emitter { primitive, corners: [a, b, c], normal, area, luminance, double_sided }
+    }
+
     fn flux(&self) -> Colour {
         self.luminance * (PI * self.area * if self.double_sided { 2.0 } else { 1.0 })
     }
@@ -217,28 +226,34 @@ pub struct Sources {
     pub lights: Vec<Light>,
     /// Emissive triangles, in the order of their primitives.
     pub emitters: Vec<Emitter>,
+    /// Luminaires with extent, in the order of their primitives.
+    pub panels: Vec<Panel>,
     /// Running sum of luminous flux over the lights \[lm\].
     light_flux: Vec<f64>,
     /// The same over the emitters, from zero: beside a lamp of 10^12 lm a panel of 1 lm keeps its digits.
     emitter_flux: Vec<f64>,
+    /// The same over the panels.
+    panel_flux: Vec<f64>,
     /// Centre and radius of the sphere that parallel light must cover \[m\].
     covered: (DVec3, f64),
 }
 
 impl Sources {
-    /// Joins `lights` and `emitters` over a scene bounded by `covered`; sources without flux are left out.
-    pub fn new(lights: Vec<Light>, emitters: Vec<Emitter>, covered: (DVec3, f64)) -> Self {
+    /// Joins `lights`, `emitters` and `panels` over a scene bounded by `covered`; sources without flux are left out.
+    pub fn new(lights: Vec<Light>, emitters: Vec<Emitter>, panels: Vec<Panel>, covered: (DVec3, f64)) -> Self {
         let lit = |flux: Colour| flux.luminance() > 0.0;
         let lights: Vec<Light> = lights.into_iter().filter(|l| lit(l.flux(covered.1))).collect();
         let emitters: Vec<Emitter> = emitters.into_iter().filter(|e| lit(e.flux())).collect();
         let light_flux = running_sum(lights.iter().map(|l| l.flux(covered.1)));
         let emitter_flux = running_sum(emitters.iter().map(Emitter::flux));
-        Sources { lights, emitters, light_flux, emitter_flux, covered }
+        let panels: Vec<Panel> = panels.into_iter().filter(|p| lit(p.luminaire.flux())).collect();
+        let panel_flux = running_sum(panels.iter().map(|p| p.luminaire.flux()));
+        Sources { lights, emitters, panels, light_flux, emitter_flux, panel_flux, covered }
     }
 
     /// Number of sources.
     pub fn len(&self) -> usize {
-        self.lights.len() + self.emitters.len()
+        self.lights.len() + self.emitters.len() + self.panels.len()
     }
 
     /// True in the dark.
@@ -248,7 +263,36 @@ impl Sources {
 
     /// Luminous flux of all sources \[lm\].
     pub fn flux(&self) -> f64 {
-        last(&self.light_flux) + last(&self.emitter_flux)
+        last(&self.light_flux) + last(&self.emitter_flux) + last(&self.panel_flux)
+    }
+
+    /// Chooses a face of a panel by `u` in [0, 1), the panel in proportion to flux and the face to area: the two, and their
+    /// probability.
+    pub fn choose_face(&self, u: f64) -> (&Panel, &Emitter, f64) {
+        let all = last(&self.panel_flux);
+        let number = choose(&self.panel_flux, u * all);
+        let panel = &self.panels[number];
+        let own = panel.luminaire.flux().luminance();
+        let mut left = ((u * all - (self.panel_flux[number] - own)) / own).clamp(0.0, 1.0) * panel.area;
+        let reached = |face: &&Emitter| {
+            left -= face.area;
+            left < 0.0
+        };
+        let face = panel.faces.iter().find(reached).unwrap_or(&panel.faces[panel.faces.len() - 1]);
+        (panel, face, self.face_probability(panel, face))
+    }
+
+    /// The panel of which the triangle `primitive` is a face, and the face.
+    pub fn panel_face(&self, primitive: u32) -> Option<(&Panel, &Emitter)> {
+        let number = self.panels.partition_point(|panel| panel.faces[0].primitive <= primitive).checked_sub(1)?;
+        let panel = &self.panels[number];
+        let face = panel.faces.get((primitive - panel.faces[0].primitive) as usize)?;
+        Some((panel, face))
+    }
+
+    /// Probability with which [`Sources::choose_face`] chooses `face` of `panel`.
+    pub fn face_probability(&self, panel: &Panel, face: &Emitter) -> f64 {
+        panel.luminaire.flux().luminance() / last(&self.panel_flux) * face.area / panel.area
     }
 
     /// Chooses an emitter in proportion to flux by `u` in [0, 1): the emitter and its probability.
@@ -280,10 +324,16 @@ impl Sources {
     pub fn emit(&self, geometry: &Geometry, rng: &mut Generator) -> Emission {
         let target = if self.len() == 1 { 0.0 } else { rng.uniform() * self.flux() };
         let of_lights = last(&self.light_flux);
-        let (origin, direction, flux) = if target < of_lights || self.emitters.is_empty() {
+        let of_surfaces = of_lights + last(&self.emitter_flux);
+        let none_but_lights = self.emitters.is_empty() && self.panels.is_empty();
+        let (origin, direction, flux) = if target < of_lights || none_but_lights {
             self.emit_light(&self.lights[choose(&self.light_flux, target)], rng)
-        } else {
+        } else if target < of_surfaces || self.panels.is_empty() {
             emit_triangle(&self.emitters[choose(&self.emitter_flux, target - of_lights)], geometry, rng)
+        } else {
+            let panel = &self.panels[choose(&self.panel_flux, target - of_surfaces)];
+            let (origin, direction) = panel.emit(geometry, rng);
+            (origin, direction, panel.luminaire.flux())
         };
         // flux over the probability of the choice: the colour of the source, the luminous flux of all.
         Emission { origin, direction, weight: flux * (self.flux() / flux.luminance()) }

@@ -10,7 +10,7 @@
 //! ([`super::direct`]). Who takes part depends on places alone, so both are unbiased.
 
 use super::connection::{Connectors, Link, LitPoint, Rule, Tile, connect};
-use super::direct::{from_emitters, from_some_emitters};
+use super::direct::{from_emitters, from_panels, from_some_emitters};
 use super::receiver::Receiver;
 use crate::geometry::Ray;
 use crate::geometry::visibility::{BUNDLE, BUNDLES, Lanes, Points, Scratch};
@@ -87,6 +87,9 @@ pub fn direct_light(
 ) -> Vec<Colour> {
     let places: Vec<Receiver> = receivers.iter().map(|(r, _)| *r).collect();
     let mut light = if lights { of_lights(scene, &places) } else { vec![Colour::BLACK; places.len()] };
+    for ((receiver, rng), light) in receivers.iter_mut().zip(&mut light) {
+        *light += from_panels(scene, receiver, samples, rng);
+    }
     if scene.sources.emitters.is_empty() {
         return light;
     }

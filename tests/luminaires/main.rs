@@ -6,6 +6,7 @@ mod gltf_builder;
 
 mod bad;
 mod naive;
+mod openings;
 mod reading;
 mod sampling;
 mod scenes;

@@ -1,7 +1,7 @@
 //! Luminaires in scenes: where their light falls, through the plan and back, and that what leaves them arrives.
 
 use crate::gltf_builder::Builder;
-use crate::{bytes, folder};
+use crate::{bytes, folder, photometry};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use lampyris::error::Result;
@@ -9,6 +9,7 @@ use lampyris::farm::folder::Folder;
 use lampyris::farm::inputs::{load_scene, prepare};
 use lampyris::farm::plan::Plan;
 use lampyris::math::{DVec3, PI};
+use lampyris::scene::photometric_web::Photometry;
 use lampyris::scene::{Scene, gltf};
 use lampyris::transport::direct::from_lights;
 use lampyris::transport::receiver::{Receiver, Response};
@@ -20,7 +21,7 @@ use std::process::Command;
 use tempfile::TempDir;
 
 /// A receiver far away, so that a job has one.
-const SOMEWHERE: &str = "[[point]]\nname = \"p\"\nposition = [0.0, 9.0, 0.0]\nnormal = [0.0, 1.0, 0.0]\n";
+pub const SOMEWHERE: &str = "[[point]]\nname = \"p\"\nposition = [0.0, 9.0, 0.0]\nnormal = [0.0, 1.0, 0.0]\n";
 
 /// A folder with the job and the files of the tests that it names, and others.
 fn place(job: &str, others: &[(&str, Vec<u8>)]) -> TempDir {
@@ -37,7 +38,7 @@ fn place(job: &str, others: &[(&str, Vec<u8>)]) -> TempDir {
 }
 
 /// The scene of a job as a worker builds it, from nothing but the planned folder.
-fn planned(job: &str, others: &[(&str, Vec<u8>)]) -> Result<(Scene, Plan)> {
+pub fn planned(job: &str, others: &[(&str, Vec<u8>)]) -> Result<(Scene, Plan)> {
     let temp = place(job, others);
     let prepared = prepare(&temp.path().join("job.toml"))?;
     let kept = tempfile::tempdir().unwrap();
@@ -52,7 +53,7 @@ fn scene(job: &str) -> Scene {
 }
 
 /// Illuminance at `position` on a surface with `normal` \[lx\].
-fn lux(scene: &Scene, position: [f64; 3], normal: [f64; 3]) -> f64 {
+pub fn lux(scene: &Scene, position: [f64; 3], normal: [f64; 3]) -> f64 {
     let receiver = Receiver {
         position: scene.place(position),
         normal: DVec3::from(normal).normalize(),
@@ -66,14 +67,14 @@ fn lux_across(scene: &Scene, position: [f64; 3], from: [f64; 3]) -> f64 {
     lux(scene, position, (DVec3::from(from) - DVec3::from(position)).to_array())
 }
 
-fn luminaire(file: &str, more: &str) -> String {
+pub fn luminaire(file: &str, more: &str) -> String {
     format!("[[luminaire]]\nfile = \"{file}\"\n{more}\n")
 }
 
-const UP: [f64; 3] = [0.0, 1.0, 0.0];
+pub const UP: [f64; 3] = [0.0, 1.0, 0.0];
 
 #[track_caller]
-fn assert_near(found: f64, expected: f64, tolerance: f64) {
+pub fn assert_near(found: f64, expected: f64, tolerance: f64) {
     assert!((found - expected).abs() <= tolerance * expected.abs(), "{found}, not {expected}");
 }
 
@@ -340,13 +341,13 @@ fn lights_out_of_range_are_refused_by_field() {
 }
 
 /// A closed box around a luminaire, and the luminaire.
-fn boxed(file: &str, reflectance: f64, job: &str) -> Experiment {
+pub fn boxed(web: &Photometry, extent: &str, reflectance: f64, job: &str) -> Experiment {
     let mut model = closed_box(DVec3::new(3.0, 2.0, 4.0), &lambert(reflectance, 0.0));
-    let entry =
-        "[[luminaire]]\nfile = \"x\"\nposition = [1.2, 1.1, 1.7]\naim = [0.3, -1.0, 0.2]\nc0 = [1.0, 0.0, 0.5]\n";
+    let place = "position = [1.2, 1.1, 1.7]\naim = [0.3, -1.0, 0.2]\nc0 = [1.0, 0.0, 0.5]\n";
+    let entry = format!("[[luminaire]]\nfile = \"x\"\nextent = \"{extent}\"\n{place}");
     let job_file = format!("scene = \"in memory\"\n{entry}{SOMEWHERE}");
     let parsed = lampyris::job::Job::parse(&job_file, "in memory").unwrap();
-    model.hang(("in memory", "luminaire[0]"), &parsed.luminaires[0], &crate::photometry(file)).unwrap();
+    model.hang(("in memory", "luminaire[0]"), &parsed.luminaires[0], web).unwrap();
     Experiment::new(job, model).unwrap()
 }
 
@@ -354,7 +355,7 @@ fn boxed(file: &str, reflectance: f64, job: &str) -> Experiment {
 fn the_lux_on_the_walls_of_a_closed_box_sum_up_to_the_flux() {
     const CELLS: u32 = 200;
     for file in ["full.ies", "half_90_270.ies", "type_b.ies", "symmetry_3.ldt"] {
-        let experiment = boxed(file, 0.0, SOMEWHERE);
+        let experiment = boxed(&photometry(file), "point", 0.0, SOMEWHERE);
         let size = DVec3::new(3.0, 2.0, 4.0);
         let mut sum = 0.0;
         for axis in 0..3 {
@@ -377,8 +378,8 @@ fn the_lux_on_the_walls_of_a_closed_box_sum_up_to_the_flux() {
 }
 
 /// Local against reverse estimation of the light that `of` builds, of which each is given its run: the one draws directions
-/// from the source, the other asks it for intensities.
-fn compare_both_ends(what: &str, of: impl Fn(&str) -> Experiment) {
+/// from the source, the other, by `paths` in a batch, asks it for intensities.
+pub fn compare_both_ends(what: &str, paths: u32, of: impl Fn(&str) -> Experiment) {
     let run = |estimator: &str, histories: u32| {
         let sampling = format!("[run]\nhistories_per_batch = {histories}\nbatches = 32\nseed = 5\n");
         let meters = point("floor", [0.6, 0.02, 3.0], UP)
@@ -386,7 +387,7 @@ fn compare_both_ends(what: &str, of: impl Fn(&str) -> Experiment) {
             + &point("up", [1.2, 1.0, 0.4], [0.0, -1.0, 0.0]);
         of(&format!("{sampling}[transport]\nestimator = \"{estimator}\"\n{meters}")).values()
     };
-    for (a, b) in run("local", 512).iter().zip(&run("reverse", 1024)) {
+    for (a, b) in run("local", 512).iter().zip(&run("reverse", paths)) {
         let error = (a.standard_error * a.standard_error + b.standard_error * b.standard_error).sqrt();
         // Fifteen comparisons in all at a family-wise 1e-6: 5.5 sigma of a normal, more of Student's t with some 60 degrees.
         assert!((a.mean - b.mean).abs() < 6.5 * error, "{what}: {} against {}, error {error}", a.mean, b.mean);
@@ -397,7 +398,7 @@ fn compare_both_ends(what: &str, of: impl Fn(&str) -> Experiment) {
 #[test]
 fn reflected_light_is_the_same_from_both_ends() {
     for file in ["full.ies", "half_90_270.ies", "type_b.ies"] {
-        compare_both_ends(file, |job| boxed(file, 0.6, job));
+        compare_both_ends(file, 1024, |job| boxed(&photometry(file), "point", 0.6, job));
     }
     let model = || closed_box(DVec3::new(3.0, 2.0, 4.0), &lambert(0.6, 0.0));
     for kind in ["kind = \"cos_power\"\nexponent = 4.0", "kind = \"spot\"\ninner_degrees = 20.0\nouter_degrees = 50.0"]
@@ -405,7 +406,7 @@ fn reflected_light_is_the_same_from_both_ends() {
         let source = format!(
             "[[source]]\nposition = [1.2, 1.1, 1.7]\ndirection = [0.3, -1.0, 0.2]\nintensity = 100.0\n{kind}\n"
         );
-        compare_both_ends(kind, |job| Experiment::new(&format!("{job}{source}"), model()).unwrap());
+        compare_both_ends(kind, 1024, |job| Experiment::new(&format!("{job}{source}"), model()).unwrap());
     }
 }
 

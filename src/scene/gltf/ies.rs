@@ -13,6 +13,8 @@ use crate::photometry::Colour;
 use crate::scene::Light;
 use crate::scene::photometric_web::{Luminaire, Photometry, Placement};
 
+/// Largest memory of all webs of a scene \[bytes\].
+const MOST_BYTES: u64 = 1 << 30;
 const NAME: &str = "extensions.EXT_lights_ies.lights";
 
 /// The webs of the file, in its order.
@@ -24,11 +26,16 @@ pub fn webs(
     warnings: &mut Warnings,
 ) -> Result<Vec<Photometry>> {
     let profiles = document.extensions.lights_ies.as_ref().map_or(&[][..], |extension| &extension.lights);
-    let mut webs = Vec::new();
+    let (mut webs, mut bytes_of_webs) = (Vec::new(), 0);
     for (i, profile) in profiles.iter().enumerate() {
         let label = label(file, profile, i);
         let web = Photometry::parse(&label, &bytes(file, buffers, profile, i, fetch)?)?;
         web.warnings.iter().for_each(|warning| warnings.add(format!("luminaire {label}: {warning}")));
+        // Many profiles may lie on the same bytes: what a file makes of them is bounded, too.
+        bytes_of_webs += web.bytes();
+        if bytes_of_webs > MOST_BYTES {
+            return Err(file.bad(NAME, format_args!("{bytes_of_webs} bytes of webs"), format!("at most {MOST_BYTES}")));
+        }
         webs.push(web);
     }
     Ok(webs)

@@ -10,7 +10,7 @@
 
 use super::symmetry::{Kind, Measured};
 use super::text::{Named, Wanted, number};
-use super::{MOST_CANDELA, Opening, Photometry, woven};
+use super::{MOST_CANDELA, MOST_VALUES, Opening, Photometry, woven};
 use crate::error::Result;
 
 /// Lines before the sets of lamps.
@@ -131,6 +131,10 @@ impl<'a> Sheet<'a> {
         let planes = self.planes(symmetry, first, all)?;
         let angles = self.growing(first + all, count, Wanted::between("angles G", 0.0, 180.0, "degrees"))?;
         let wanted = Wanted::between("intensities", 0.0, MOST_CANDELA / factor, "cd/klm");
+        if planes.len() * count > MOST_VALUES {
+            let value = format!("{} x {count}", planes.len());
+            return Err(self.name.bad(6, "intensities", value, format!("at most {MOST_VALUES} of them")));
+        }
         let candela = self.list(first + all + count, planes.len() * count, wanted)?;
         let candela = candela.into_iter().map(|x| x * factor).collect();
         Ok(Measured { kind: Kind::C, planes, angles, candela })

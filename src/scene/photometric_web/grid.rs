@@ -61,6 +61,11 @@ impl Web {
         web
     }
 
+    /// Memory \[bytes\].
+    pub fn bytes(&self) -> u64 {
+        (8 * (self.intensity.len() + self.running.len())) as u64
+    }
+
     /// Luminous flux \[lm\].
     pub fn flux(&self) -> f64 {
         self.strips[self.strips.len() - 1]

@@ -13,7 +13,7 @@
 use super::symmetry::{Kind, Measured};
 use super::text::{Named, Numbers, Wanted};
 use super::tilt::Tilt;
-use super::{MOST_CANDELA, Opening, Photometry, woven};
+use super::{MOST_CANDELA, MOST_VALUES, Opening, Photometry, woven};
 use crate::error::Result;
 
 /// Most angles in one direction.
@@ -131,7 +131,10 @@ impl Head {
         let line = numbers.line();
         let planes = numbers.growing(across, Wanted::between("horizontal angles", -turn, turn, "degrees"))?;
         let wanted = Wanted::between("candela values", 0.0, MOST_CANDELA / factor, "cd before the factors");
-        // At most 1e10, and no more memory is taken than there are numbers.
+        if along * across > MOST_VALUES {
+            let value = format!("{along} x {across}");
+            return Err(name.bad(line, "candela values", value, format!("at most {MOST_VALUES} of them")));
+        }
         let candela = numbers.list(along * across, wanted)?.into_iter().map(|x| x * factor).collect();
         if numbers.left() > 0 {
             let allowed = format!("the end of the file after {along} x {across} candela values");

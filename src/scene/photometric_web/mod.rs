@@ -34,6 +34,8 @@ use text::Named;
 
 /// Largest intensity of a file \[cd\].
 const MOST_CANDELA: f64 = 1e12;
+/// Most intensities of a file: half a degree by half a degree, all around, are 261 000.
+const MOST_VALUES: usize = 1 << 22;
 /// From this share on a disagreement of two fluxes is reported.
 const DISAGREEMENT: f64 = 0.02;
 
@@ -87,6 +89,11 @@ impl Photometry {
             Some(tilt) => lm63::parse(Named(name), &lines, tilt),
             None => eulumdat::parse(Named(name), &lines),
         }
+    }
+
+    /// Memory of what was measured and of the web, about \[bytes\].
+    pub fn bytes(&self) -> u64 {
+        (8 * self.measured.candela.len()) as u64 + self.web.bytes()
     }
 
     /// Luminous flux, integrated in closed form \[lm\].

@@ -1,6 +1,6 @@
 //! A web at its place in a scene: which way its aim and its C0 direction point.
 
-use super::{Kind, Photometry, Web};
+use super::{Kind, Opening, Photometry, Web};
 use crate::math::{DMat3, DVec2, DVec3, PI, acos, atan2, sin_cos};
 use crate::photometry::Colour;
 use std::sync::Arc;
@@ -31,6 +31,13 @@ impl Placement {
         Some(Placement { position, aim, c0, c90 })
     }
 
+    /// Half the edges of `opening`: along its length, its width and its height. In type A the aim is the photometric horizontal, along
+    /// which a length is given, and the C0 direction is up.
+    pub(in crate::scene) fn edges(&self, opening: &Opening, kind: Kind) -> [DVec3; 3] {
+        let (along, up) = if kind == Kind::A { (self.aim, self.c0) } else { (self.c0, self.aim) };
+        [0.5 * opening.length * along, 0.5 * opening.width * self.c90, 0.5 * opening.height * up]
+    }
+
     /// The angle between the aim and straight down \[degrees\].
     pub fn tilt(&self) -> f64 {
         acos((-self.aim.y).clamp(-1.0, 1.0)) * 180.0 / PI
@@ -46,6 +53,7 @@ pub struct Luminaire {
     axes: [DVec3; 3],
     /// On the intensities of the web \[1\].
     factor: Colour,
+    kind: Kind,
     web: Arc<Web>,
 }
 
@@ -53,13 +61,14 @@ impl Luminaire {
     /// `photometry` placed, its intensities times `factor` and what the tilt of its lamp leaves.
     pub fn new(photometry: &Photometry, placement: &Placement, factor: Colour) -> Luminaire {
         let Placement { position, aim, c0, c90 } = *placement;
-        let axes = match photometry.measured.kind {
+        let kind = photometry.measured.kind;
+        let axes = match kind {
             Kind::C => [c0, c90, aim],
             // Horizontal angles run clockwise.
             Kind::A | Kind::B => [aim, -c90, c0],
         };
         let tilt = photometry.tilt.as_ref().map_or(1.0, |tilt| tilt.factor(placement.tilt()));
-        Luminaire { position, axes, factor: factor * tilt, web: photometry.web.clone() }
+        Luminaire { position, axes, factor: factor * tilt, kind, web: photometry.web.clone() }
     }
 
     /// The same elsewhere.
@@ -70,6 +79,11 @@ impl Luminaire {
     /// The factor on the intensities of the web, to be changed.
     pub(in crate::scene) fn factor_mut(&mut self) -> &mut Colour {
         &mut self.factor
+    }
+
+    /// Type of goniometer of its web.
+    pub fn kind(&self) -> Kind {
+        self.kind
     }
 
     /// Flux \[lm\].
