@@ -18,6 +18,7 @@ pub use panel::{Extended, Panel};
 pub use reflectance::{LawInLanes, Reflectance, Scattered, weight_over_tolerated, weights_over_tolerated};
 pub use source::{Emission, Emitter, Light, Sources};
 
+use self::photometric_web::Luminaire;
 use crate::error::{Error, Result};
 use crate::geometry::{Build, Geometry, Harmonic, Hit, Mesh, Plane, Sphere};
 use crate::job::{self, Channels, Job};
@@ -152,16 +153,7 @@ impl Scene {
         let lights: Vec<Light> = lights.map(|l| l.moved(offset).recoloured(paint)).collect();
         refuse_endless_flux(&geometry, &lights)?;
         let given = lights.len();
-        let mut first = model.triangles.len() - model.extended.iter().map(|e| e.faces.len()).sum::<usize>();
-        let panel = |mut extended: Extended| {
-            extended.luminaire = extended.luminaire.moved(offset);
-            let colour = extended.luminaire.factor_mut();
-            *colour = paint(*colour);
-            let faces = first as u32;
-            first += extended.faces.len();
-            Panel::new(extended, &geometry, faces)
-        };
-        let panels = model.extended.into_iter().map(panel).collect();
+        let panels = panels(&geometry, model.triangles.len(), model.extended, |l| l.moved(offset).recoloured(paint));
         let sources = Sources::new(lights, emitters, panels, geometry.bounding_sphere());
         let mut warnings = model.warnings;
         if sources.lights.len() < given {
@@ -315,6 +307,22 @@ fn emitters(geometry: &Geometry, surfaces: &[Surface], surface_of: &[u32]) -> Ve
         Emitter::of_triangle(geometry, primitive as u32, surface.emission, surface.double_sided)
     };
     (0..surface_of.len()).filter(lit).map(emitter).collect()
+}
+
+/// The luminaires with extent, whose faces are the last of the `triangles`, each `adapted` to the scene.
+fn panels(
+    geometry: &Geometry,
+    triangles: usize,
+    all: Vec<Extended>,
+    adapted: impl Fn(Luminaire) -> Luminaire,
+) -> Vec<Panel> {
+    let mut first = triangles - all.iter().map(|extended| extended.faces.len()).sum::<usize>();
+    let panel = |extended: Extended| {
+        let (from, count) = (first as u32, extended.faces.len());
+        first += count;
+        Panel::new(Extended { luminaire: adapted(extended.luminaire), ..extended }, geometry, from)
+    };
+    all.into_iter().map(panel).collect()
 }
 
 fn refuse_endless_flux(geometry: &Geometry, lights: &[Light]) -> Result<()> {

@@ -73,14 +73,13 @@ impl Light {
 
     /// The same light with its colour through `f`.
     pub(super) fn recoloured(mut self, f: impl Fn(Colour) -> Colour) -> Self {
-        let colour = match &mut self {
-            Light::Omni { intensity, .. } | Light::Spot { intensity, .. } | Light::CosPower { intensity, .. } => {
-                intensity
-            }
-            Light::Luminaire(luminaire) => luminaire.factor_mut(),
-            Light::Directional { illuminance, .. } => illuminance,
-        };
-        *colour = f(*colour);
+        match &mut self {
+            Light::Omni { intensity: colour, .. }
+            | Light::Spot { intensity: colour, .. }
+            | Light::CosPower { intensity: colour, .. }
+            | Light::Directional { illuminance: colour, .. } => *colour = f(*colour),
+            Light::Luminaire(luminaire) => *luminaire = luminaire.clone().recoloured(f),
+        }
         self
     }
 

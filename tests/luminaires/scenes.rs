@@ -418,9 +418,10 @@ fn lampyris(at: &TempDir, args: &[&str]) -> std::process::Output {
 fn a_planned_folder_holds_its_luminaires_and_workers_change_no_bits() {
     let run = "[run]\nhistories_per_batch = 64\nbatches = 16\nbatches_per_shard = 4\n[[plane]]\npoint = [0, 0, 0]\nnormal = [0, 1, 0]\nreflectance = 0.5\n[[point]]\nname = \"above\"\nposition = [0.0, 3.0, 0.0]\nnormal = [0.0, -1.0, 0.0]\n";
     let job = format!(
-        "{run}{}{}",
+        "{run}{}{}{}",
         luminaire("full.ies", "position = [0.0, 2.0, 0.0]"),
-        luminaire("full.ies", "position = [1.0, 2.0, 0.0]\ndimming = 0.5")
+        luminaire("full.ies", "position = [1.0, 2.0, 0.0]\ndimming = 0.5"),
+        luminaire("opening_sphere.ies", "position = [-1.0, 2.0, 0.0]\nextent = \"opening\"")
     );
     let digest = |workers: &str, changed: bool| {
         let at = place(&job, &[]);

@@ -76,9 +76,9 @@ impl Luminaire {
         Luminaire { position: self.position + offset, ..self }
     }
 
-    /// The factor on the intensities of the web, to be changed.
-    pub(in crate::scene) fn factor_mut(&mut self) -> &mut Colour {
-        &mut self.factor
+    /// The same with its colour through `f`.
+    pub(in crate::scene) fn recoloured(self, f: impl Fn(Colour) -> Colour) -> Self {
+        Luminaire { factor: f(self.factor), ..self }
     }
 
     /// Type of goniometer of its web.
