@@ -1,4 +1,4 @@
-//! Command line: run, plan, work, status, merge, extend, compact, audit, fit, validate. Types only; what they do is in `commands.rs`.
+//! Command line: run, plan, work, status, merge, extend, compact, audit, fit, luminaire, validate. Types only; what they do is in `commands.rs`.
 //!
 //! Flags say where and with how many processes; none of them changes a number. Only the job does.
 
@@ -133,6 +133,15 @@ pub enum Command {
         /// The file to write; a picture with .png instead of .harmonic goes beside it.
         #[arg(short, long, value_name = "OUT.harmonic")]
         output: PathBuf,
+    },
+    /// Say what a photometric file holds (IES LM-63, EULUMDAT), and draw its polar curves.
+    #[command(after_help = "Example:\n  lampyris luminaire downlight.ies -o downlight.png")]
+    Luminaire {
+        /// An .ies or .ldt file.
+        file: PathBuf,
+        /// The picture [default: the name of the file with .png, in the current folder].
+        #[arg(short, long, value_name = "OUT.png")]
+        output: Option<PathBuf>,
     },
     /// Run cases with an exact answer and print reference, estimate, interval and z; exit code 1 if any fails.
     #[command(after_help = "Examples:\n  lampyris validate\n  lampyris validate --case sobolev/\n  \

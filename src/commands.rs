@@ -14,6 +14,7 @@ use lampyris::farm::worker::{self, Order};
 use lampyris::fit;
 use lampyris::geometry::simd;
 use lampyris::report;
+use lampyris::scene::photometric_web::Photometry;
 use lampyris::validate::{self, Found};
 use std::fs::OpenOptions;
 use std::path::{Path, PathBuf};
@@ -69,6 +70,7 @@ pub fn execute(command: Command) -> Result<Outcome> {
             let text = fit::run(&fit::Request { mesh, node, degree, numbers, lanczos, output })?;
             Ok(Outcome { text, exit: Exit::Done })
         }
+        Command::Luminaire { file, output } => luminaire(&file, output),
         Command::Validate { case, markdown, note } => validate(case.as_deref(), markdown.as_deref(), note.as_deref()),
     }
 }
@@ -181,6 +183,22 @@ fn compact(dir: &Path) -> Result<Outcome> {
         0 => "nothing to compact: the first shard is not whole yet\n".to_owned(),
         _ => format!("shards 0 .. {} are in one file, {files} files removed\n", shards - 1),
     };
+    Ok(Outcome { text, exit: Exit::Done })
+}
+
+/// Says what a photometric file holds, and draws its polar curves.
+fn luminaire(file: &Path, output: Option<PathBuf>) -> Result<Outcome> {
+    let name = file.display().to_string();
+    let bytes = std::fs::read(file)
+        .map_err(|e| Error::input("command line", "FILE", &name, format!("an IES or EULUMDAT file ({e})")))?;
+    let photometry = Photometry::parse(&name, &bytes)?;
+    let stem = file.file_stem().unwrap_or_default();
+    let picture = output.unwrap_or_else(|| Path::new(stem).with_extension("png"));
+    // A bare name has an empty parent, which is no folder that can be opened.
+    let picture = if picture.parent() == Some(Path::new("")) { Path::new(".").join(picture) } else { picture };
+    let title = file.file_name().unwrap_or_default().to_string_lossy();
+    report::write_polar(&picture, &title, &photometry)?;
+    let text = format!("{}curves in {}\n", report::luminaire_text(&photometry), picture.display());
     Ok(Outcome { text, exit: Exit::Done })
 }
 

@@ -35,8 +35,10 @@ mod derived;
 mod derived_text;
 mod exr;
 mod health;
+mod luminaire;
 mod number;
 mod png;
+mod polar;
 mod regions;
 mod scale;
 mod stopping;
@@ -45,8 +47,10 @@ mod text;
 mod values;
 mod views;
 
+pub use luminaire::luminaire_text;
 pub use number::short;
 pub use png::MAP_ORIGIN;
+pub use polar::write_polar;
 pub use views::{View, write_views};
 
 use crate::error::{Error, Result};

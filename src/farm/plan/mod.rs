@@ -171,6 +171,10 @@ impl Plan {
             let replaced = |r: &'_ Replacement| (r.node.clone(), r.degree);
             bytes.extend(bytes_of(&self.job.replacements.iter().map(replaced).collect::<Vec<_>>()));
         }
+        // Behind the rest, and nothing without luminaires: jobs that have none keep their digests.
+        if !self.job.luminaires.is_empty() {
+            bytes.extend(serde_json::to_vec(&self.job.luminaires).expect("plain data always has a JSON form"));
+        }
         blake3::hash(&bytes)
     }
 
