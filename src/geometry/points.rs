@@ -6,6 +6,9 @@ use super::simd::{Isa, Vector};
 use super::visibility::{BUNDLE, BUNDLES, GROUP, Lanes};
 use crate::math::{DVec3, Vec3};
 
+/// Apexes for which cones of points of star-shaped objects pay.
+const ENOUGH: usize = 8;
+
 /// A box between two corners \[m\].
 pub(super) type Corners = ([f32; 3], [f32; 3]);
 
@@ -29,8 +32,9 @@ pub struct Points {
 }
 
 impl Points {
-    /// The tile of `points`, at most [`TILE`](super::visibility::TILE) \[m\].
-    pub fn new(geometry: &Geometry, points: &[Vec3]) -> Self {
+    /// The tile of `points`, at most [`TILE`](super::visibility::TILE) \[m\], for about so many `apexes`: what would not pay for a few is not
+    /// found out about them. The answers are the same.
+    pub fn new(geometry: &Geometry, points: &[Vec3], apexes: usize) -> Self {
         let empty = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
         let mut tile = Points {
             x: [[0.0; BUNDLE]; BUNDLES],
@@ -65,7 +69,7 @@ impl Points {
         let sides = |p: &super::Plane| [where_true(&|q| p.height(q) > 0.0), where_true(&|q| p.height(q) < 0.0)];
         tile.sides = geometry.planes.iter().map(sides).collect();
         tile.inside = geometry.spheres.iter().map(|s| where_true(&|q| s.contains(q))).collect();
-        tile.beside = geometry.harmonics.iter().map(|h| TileBeside::new(h, points)).collect();
+        tile.beside = geometry.harmonics.iter().map(|h| TileBeside::new(h, points, apexes >= ENOUGH)).collect();
         tile
     }
 

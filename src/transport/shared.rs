@@ -129,7 +129,7 @@ fn near_emitters(scene: &Scene, receivers: &[Receiver]) -> Vec<(u32, Vec<bool>)>
 fn of_lights(scene: &Scene, receivers: &[Receiver]) -> Vec<Colour> {
     let mut sums = vec![Colour::BLACK; receivers.len()];
     let lifted: Vec<Vec3> = receivers.iter().map(|r| scene.geometry.lift(r.position, r.normal).as_vec3()).collect();
-    let points = Points::new(&scene.geometry, &lifted);
+    let points = Points::new(&scene.geometry, &lifted, scene.sources.lights.len());
     for light in &scene.sources.lights {
         let arriving: Vec<_> = receivers.iter().map(|r| light.at(r.position)).collect();
         let mut seen: Lanes = [0; BUNDLES];

@@ -59,11 +59,11 @@ const NONE: f32 = 2.0;
 const ROUNDING: f64 = 1e-5;
 
 impl TileBeside {
-    pub(in crate::geometry) fn new(object: &Harmonic, points: &[Vec3]) -> Self {
+    pub(in crate::geometry) fn new(object: &Harmonic, points: &[Vec3], with_cones: bool) -> Self {
         let mut tile = TileBeside { inside: [0; BUNDLES], near: [0; BUNDLES], cones: None, bends: Vec::new() };
         for (i, &point) in points.iter().enumerate() {
             let (bundle, lane) = (i / BUNDLE, i % BUNDLE);
-            let Beside { inside, near, free, bend } = object.beside(point.as_dvec3());
+            let Beside { inside, near, free, bend } = object.beside(point.as_dvec3(), with_cones);
             tile.inside[bundle] |= u16::from(inside) << lane;
             tile.near[bundle] |= u16::from(near) << lane;
             tile.bends.extend(bend.map(|bend| (i as u16, bend)));

@@ -50,14 +50,6 @@ pub(in crate::geometry) struct Cone {
     pub(in crate::geometry) cosine: f64,
 }
 
-impl Cone {
-    /// True when it holds the direction `d`, of any length.
-    pub(in crate::geometry) fn holds(&self, d: DVec3) -> bool {
-        let along = self.axis.dot(d);
-        along > 0.0 && along * along > self.cosine * self.cosine * d.length_squared()
-    }
-}
-
 /// Sixteen balls.
 #[derive(Clone, Debug)]
 struct Balls {

@@ -116,8 +116,8 @@ impl Harmonic {
         length <= (value + error) * reach
     }
 
-    /// Where `p` is \[m\].
-    pub(in crate::geometry) fn beside(&self, p: DVec3) -> Beside {
+    /// Where `p` is \[m\], with its cone where that is asked for.
+    pub(in crate::geometry) fn beside(&self, p: DVec3, with_cone: bool) -> Beside {
         let own = self.to_own * (p - self.center);
         let length = own.length();
         let (low, high) = self.star.radii();
@@ -134,7 +134,7 @@ impl Harmonic {
         let (inside, near) = (length < bend.value, length < bend.value * reach);
         let horizon = self.shells.as_ref().and_then(|shells| shells.horizon.as_ref());
         let is_beside = near && !inside;
-        let free = horizon.filter(|_| is_beside).map(|horizon| {
+        let free = horizon.filter(|_| is_beside && with_cone).map(|horizon| {
             let cone = horizon.cone(&self.star, own, &bend);
             Cone { axis: (self.to_world * cone.axis).normalize(), ..cone }
         });
@@ -178,7 +178,7 @@ impl Harmonic {
         seen: &mut Lanes,
         scratch: &mut Scratch,
     ) {
-        let here = self.beside(apex.as_dvec3());
+        let here = self.beside(apex.as_dvec3(), true);
         let mut undecided = *seen;
         for bundle in 0..BUNDLES {
             let (inside, free) = (beside.inside[bundle], beside.free(bundle, points, apex, &here, undecided[bundle]));
@@ -260,15 +260,11 @@ impl Harmonic {
     /// True when the segment between `a` and `b` crosses the surface \[m\].
     pub(in crate::geometry) fn blocks(&self, a: Vec3, b: Vec3) -> bool {
         let (from, to) = (a.as_dvec3(), b.as_dvec3());
-        let sides = [self.beside(from), self.beside(to)];
+        let sides = [self.beside(from, false), self.beside(to, false)];
         if sides[0].inside != sides[1].inside {
             return true;
         }
         if let Some(shells) = self.shells.as_ref().filter(|_| !sides[0].inside) {
-            let leaves = |side: &Beside, way: DVec3| side.free.is_some_and(|cone| cone.holds(way));
-            if leaves(&sides[0], to - from) || leaves(&sides[1], from - to) {
-                return false;
-            }
             let both_near = sides[0].near && sides[1].near;
             if !both_near && !shells.outer.blocks(a, b) {
                 return false;
