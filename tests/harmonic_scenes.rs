@@ -65,3 +65,55 @@ fn a_series_encloses_an_integrating_sphere() {
         .collect();
     assert_all(&all);
 }
+
+#[test]
+fn a_luminous_sphere_gives_what_its_size_says_down_to_contact() {
+    let (radius, luminance) = (0.4, 100.0);
+    let mut job = run(1024, 16);
+    let places = [(1.001, 1.0), (1.2, 1.0), (3.0, 1.0), (3.0, 0.6)];
+    for (i, (distance, cosine)) in places.into_iter().enumerate() {
+        let across = f64::sqrt(1.0 - cosine * cosine);
+        job += &point(&format!("p{i}"), [distance * radius, 0.0, 0.0], [-cosine, 0.0, across]);
+    }
+    let scaled = DMat3::from_diagonal(DVec3::new(0.5, 0.5, -0.5));
+    let model = with_star(Model::default(), Series::constant(0.8), DVec3::ZERO, scaled, lambert(0.0, luminance));
+    let case = Case::new(&job, model);
+    let flux = case.scene.sources.flux();
+    assert!((flux / (4.0 * PI * PI * radius * radius * luminance) - 1.0).abs() < 1e-12, "{flux}");
+    let estimates = case.estimates();
+    let all: Vec<_> = (estimates.iter().flatten().zip(places))
+        .map(|(estimate, (distance, cosine))| {
+            let expected = PI * luminance * cosine / (distance * distance);
+            assert!(estimate.standard_error < 0.02 * expected, "at {distance} radii");
+            compare(format!("E at {distance} radii"), *estimate, expected)
+        })
+        .collect();
+    assert_all(&all);
+}
+
+/// A lumpy body that shines in a room beside a lamp: shared between both estimators, which know nothing of each other's direct light.
+#[test]
+fn light_of_an_emissive_series_is_that_of_rays_that_find_it() {
+    let mut pairs = vec![[0.25, 0.0], [0.03, 0.0], [-0.02, 0.04]];
+    pairs.extend([[0.04, 0.0], [0.02, -0.03], [0.01, 0.03], [-0.03, 0.0], [0.02, 0.0], [0.0, 0.02], [0.01, 0.01]]);
+    let turned = DMat3::from_cols(DVec3::new(0.6, 0.8, 0.0), DVec3::new(-0.8, 0.6, 0.0), DVec3::new(0.1, 0.0, 0.7));
+    let room = || {
+        let (room, series) = (closed_box(DVec3::ONE, &lambert(0.5, 0.0)), Series::new(&pairs).unwrap());
+        with_star(room, series, DVec3::new(0.5, 0.5, 0.4), turned, lambert(0.3, 50.0))
+    };
+    let mut places = omni([0.2, 0.8, 0.9], 1.0);
+    let points = [[0.5, 0.5, 0.001], [0.95, 0.5, 0.4], [0.5, 0.62, 0.9]];
+    let normals = [[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]];
+    for (i, (p, n)) in points.into_iter().zip(normals).enumerate() {
+        places += &point(&format!("p{i}"), p, n);
+    }
+    places += &spot_camera("wall", [0.1, 0.1, 0.9], [1.0, 0.6, 0.35], [0.0, 1.0, 0.0]);
+    places += &spot_camera("body", [0.1, 0.1, 0.9], [0.5, 0.5, 0.4], [0.0, 1.0, 0.0]);
+    let local = Case::new(&(run(2048, 32) + &places), room()).estimates();
+    let reversed = run(8192, 32) + "[transport]\nestimator = \"reverse\"\n" + &places;
+    let reverse = Case::new(&reversed, room()).estimates();
+    let pairs = local.iter().flatten().zip(reverse.iter().flatten());
+    let all: Vec<_> = pairs.enumerate().map(|(i, (l, r))| difference(format!("bin {i}"), *l, *r)).collect();
+    assert_eq!(all.len(), 5);
+    assert_all(&all);
+}

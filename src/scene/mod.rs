@@ -4,7 +4,9 @@
 //! builds the acceleration structure, turns emissive triangles into area lights and prepares the choice of a
 //! source in proportion to flux. A scene does not know receivers, seeds or files.
 
+mod body;
 pub mod gltf;
+mod light;
 mod luminaires;
 mod nodes;
 mod panel;
@@ -13,10 +15,12 @@ mod reflectance;
 mod replace;
 mod source;
 
+pub use body::{Body, BodyPoint, in_cone};
+pub use light::Light;
 pub use nodes::{Node, Nodes};
 pub use panel::{Extended, Panel};
 pub use reflectance::{LawInLanes, Reflectance, Scattered, weight_over_tolerated, weights_over_tolerated};
-pub use source::{Emission, Emitter, Light, Sources};
+pub use source::{Emission, Emitter, Sources};
 
 use self::photometric_web::Luminaire;
 use crate::error::{Error, Result};
@@ -154,7 +158,8 @@ impl Scene {
         refuse_endless_flux(&geometry, &lights)?;
         let given = lights.len();
         let panels = panels(&geometry, model.triangles.len(), model.extended, |l| l.moved(offset).recoloured(paint));
-        let sources = Sources::new(lights, emitters, panels, geometry.bounding_sphere());
+        let bodies = bodies(&geometry, &surfaces, &surface_of);
+        let sources = Sources::new(lights, emitters, panels, bodies, geometry.bounding_sphere());
         let mut warnings = model.warnings;
         if sources.lights.len() < given {
             let dark = given - sources.lights.len();
@@ -306,7 +311,18 @@ fn emitters(geometry: &Geometry, surfaces: &[Surface], surface_of: &[u32]) -> Ve
         let surface = &surfaces[surface_of[primitive] as usize];
         Emitter::of_triangle(geometry, primitive as u32, surface.emission, surface.double_sided)
     };
-    (0..surface_of.len()).filter(lit).map(emitter).collect()
+    (0..geometry.triangles() as usize).filter(lit).map(emitter).collect()
+}
+
+/// The star-shaped objects that emit: the last of all surfaces.
+fn bodies(geometry: &Geometry, surfaces: &[Surface], surface_of: &[u32]) -> Vec<Body> {
+    let first = surface_of.len() - geometry.harmonics().len();
+    let body = |(object, &surface): (usize, &u32)| {
+        let surface = &surfaces[surface as usize];
+        let lit = !surface.emission.is_black();
+        lit.then(|| Body::new(geometry, object, (first + object) as u32, surface))
+    };
+    surface_of[first..].iter().enumerate().filter_map(body).collect()
 }
 
 /// The luminaires with extent, whose faces are the last of the `triangles`, each `adapted` to the scene.

@@ -12,7 +12,7 @@ impl Model {
     /// the name of the job file, `at` the field that asks for it.
     ///
     /// # Errors
-    /// [`Error::Input`] where there is not one such node with a mesh of one material that does not emit, or its transform flattens.
+    /// [`Error::Input`] where there is not one such node with a mesh of one material, or its transform flattens.
     pub fn replace(&mut self, (job, at): (&str, &str), node: &str, file: File) -> Result<()> {
         let bad = |value: &str, allowed: String| Error::input(job, format!("{at}.node"), value, allowed);
         let places = self.nodes.called(node);
@@ -29,9 +29,6 @@ impl Model {
                 format!("a node that shows a mesh of one material itself, not of {}", surfaces.len()),
             ));
         };
-        if !self.surfaces[surface as usize].emission.is_black() {
-            return Err(bad(node, "a mesh that does not emit: series do not, yet".into()));
-        }
         let world = self.nodes.list[place].world;
         let harmonic =
             Harmonic::new(Star::new(file.series)?, world.transform_point3(file.center), DMat3::from_mat4(world))?;

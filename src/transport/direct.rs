@@ -66,9 +66,9 @@ pub fn from_emitters(scene: &Scene, receiver: &Receiver, samples: u64, rng: &mut
             sum += sample_emitter(scene, receiver, &sight, rng);
         }
         if receiver.response.is_peaked() {
-            let seen = |primitive: u32| {
-                let (emitter, probability) = scene.sources.emitter(primitive)?;
-                Sight::new(emitter, probability, lifted)
+            let seen = |hit: &Hit, w_in: DVec3| {
+                let (emitter, probability) = scene.sources.emitter(hit.primitive)?;
+                Some(Sight::new(emitter, probability, lifted)?.of_hit(hit, w_in))
             };
             sum += sample_response(scene, receiver, lifted, rng, seen);
         }
@@ -90,9 +90,10 @@ pub fn from_panels(scene: &Scene, receiver: &Receiver, samples: u64, rng: &mut G
             sum += sample_emitter(scene, receiver, &sight.of(panel), rng);
         }
         if receiver.response.is_peaked() {
-            let seen = |primitive: u32| {
-                let (panel, face) = scene.sources.panel_face(primitive)?;
-                Some(Sight::new(face, scene.sources.face_probability(panel, face), lifted)?.of(panel))
+            let seen = |hit: &Hit, w_in: DVec3| {
+                let (panel, face) = scene.sources.panel_face(hit.primitive)?;
+                let sight = Sight::new(face, scene.sources.face_probability(panel, face), lifted)?;
+                Some(sight.of(panel).of_hit(hit, w_in))
             };
             sum += sample_response(scene, receiver, lifted, rng, seen);
         }
@@ -133,25 +134,26 @@ fn sample_emitter(scene: &Scene, receiver: &Receiver, sight: &Sight, rng: &mut G
     sight.luminance(w_in) * (cosine / both) * receiver.response.to(scene, receiver.normal, w_in)
 }
 
-/// One sample of the light that emitters send where the peaked response looks.
-fn sample_response<'a>(
+/// One sample of the light that emitters send where the peaked response looks: those of which `seen` knows, from the hit and the
+/// propagation direction, the luminance and the density with which they are drawn otherwise.
+pub(super) fn sample_response(
     scene: &Scene,
     receiver: &Receiver,
     from: DVec3,
     rng: &mut Generator,
-    seen: impl Fn(u32) -> Option<Sight<'a>>,
+    seen: impl Fn(&Hit, DVec3) -> Option<(Colour, f64)>,
 ) -> Colour {
     let Some((direction, weight)) = receiver.response.sample(scene, receiver.normal, rng) else {
         return Colour::BLACK;
     };
     let hit = scene.geometry.closest_hit(&Ray { origin: from, direction });
-    let Some((hit, sight)) = hit.and_then(|hit: Hit| Some((hit, seen(hit.primitive)?))) else { return Colour::BLACK };
+    let Some((luminance, drawn)) = hit.and_then(|hit| seen(&hit, -direction)) else { return Colour::BLACK };
     let density = density_of_response(scene, receiver, -direction);
-    sight.luminance(-direction) * weight * (density / (density + sight.density(hit.position)))
+    luminance * weight * (density / (density + drawn))
 }
 
 /// Density of directions drawn from the response, 0 where it is not peaked and none are drawn \[1/sr\].
-fn density_of_response(scene: &Scene, receiver: &Receiver, w_in: DVec3) -> f64 {
+pub(super) fn density_of_response(scene: &Scene, receiver: &Receiver, w_in: DVec3) -> f64 {
     let peaked = receiver.response.is_peaked();
     if peaked { receiver.response.pdf(scene, receiver.normal, w_in) } else { 0.0 }
 }
@@ -191,6 +193,11 @@ impl<'a> Sight<'a> {
     /// Luminance of light with the propagation direction `w_in` \[cd/m2\].
     fn luminance(&self, w_in: DVec3) -> Colour {
         self.panel.map_or(self.emitter.luminance, |panel| panel.luminance(w_in))
+    }
+
+    /// Luminance of light with the propagation direction `w_in` from where a ray met it, and the density with which that is drawn.
+    fn of_hit(&self, hit: &Hit, w_in: DVec3) -> (Colour, f64) {
+        (self.luminance(w_in), self.density(hit.position))
     }
 
     /// A point of the emitter. The luminance of a luminaire grows without bound where it is seen edge-on and still shines: by area

@@ -9,6 +9,7 @@
 //! the longest edge of an emitter does not take part in them, nor does one with a peaked response: it has samples of its own
 //! ([`super::direct`]). Who takes part depends on places alone, so both are unbiased.
 
+use super::bodies::from_bodies;
 use super::connection::{Connectors, Link, LitPoint, Rule, Tile, connect};
 use super::direct::{from_emitters, from_panels, from_some_emitters};
 use super::receiver::Receiver;
@@ -89,6 +90,7 @@ pub fn direct_light(
     let mut light = if lights { of_lights(scene, &places) } else { vec![Colour::BLACK; places.len()] };
     for ((receiver, rng), light) in receivers.iter_mut().zip(&mut light) {
         *light += from_panels(scene, receiver, samples, rng);
+        *light += from_bodies(scene, receiver, samples, rng);
     }
     if scene.sources.emitters.is_empty() {
         return light;

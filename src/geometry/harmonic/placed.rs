@@ -226,6 +226,21 @@ impl Harmonic {
         (position, turned / stretch, area * self.to_world.determinant().abs() * stretch)
     }
 
+    /// The direction, in its own coordinates, of `position` \[m\].
+    pub fn direction_of(&self, position: DVec3) -> DVec3 {
+        (self.to_own * (position - self.center)).normalize()
+    }
+
+    /// No point has more area for each unit of solid angle of its own coordinates \[m2/sr\].
+    pub fn greatest_area_element(&self) -> f64 {
+        let (high, steep) = (self.star.bounds.high, self.star.bounds.first);
+        // A turned normal is stretched by no more than the root of the sum of squares of its matrix.
+        let columns = [self.to_own.x_axis, self.to_own.y_axis, self.to_own.z_axis];
+        let stretch = columns.iter().map(|c| c.length_squared()).sum::<f64>().sqrt();
+        let stretch = self.even().map_or(stretch, |even| 1.0 / even);
+        high * (high * high + steep * steep).sqrt() * self.to_world.determinant().abs() * stretch
+    }
+
     /// Area of the surface \[m2\].
     pub fn area(&self) -> f64 {
         self.star.over_the_sphere(|_, n0| self.point(n0).2)
