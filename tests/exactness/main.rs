@@ -9,6 +9,7 @@ mod bits;
 mod changes;
 #[cfg(all(target_arch = "x86_64", target_env = "gnu"))]
 mod cpu;
+mod engines;
 mod faults;
 mod kills;
 mod merging;
