@@ -1,4 +1,5 @@
-//! Command line: run, plan, work, status, merge, submit, fit, validate. Types only; what they do is in `commands.rs`.
+//! Command line: run, plan, work, status, merge, submit, extend, compact, audit, fit, luminaire, validate. Types only; what they
+//! do is in `commands.rs`.
 //!
 //! Flags say where and with how many processes; none of them changes a number. Only the job does.
 
@@ -29,7 +30,7 @@ pub enum Command {
     /// Plan, compute with several worker processes, merge and report; resumes what is unfinished.
     #[command(after_help = "Example:\n  lampyris run jobs/room.toml -o out/room -w 4")]
     Run {
-        /// The job file.
+        /// The job file, or a folder that is planned already.
         job: PathBuf,
         /// Folder of the plan, its checkpoints and results [default: out/<job name>].
         #[arg(short, long, value_name = "DIR")]
@@ -94,6 +95,33 @@ pub enum Command {
                       lampyris submit out/room --engine slurm --array-limit 50 --sbatch '--account=light'\n  \
                       lampyris submit out/room --engine ssh --hosts hosts.txt")]
     Submit(Submit),
+    /// Add batches to a planned folder, whether it is finished or not: its checkpoints stay and are continued.
+    #[command(after_help = "Example:\n  lampyris extend out/room --batches 512\n  lampyris run out/room")]
+    Extend {
+        /// Folder of the plan.
+        dir: PathBuf,
+        /// Batches of the whole job from now on; with a goal its max_batches.
+        #[arg(long, value_name = "N")]
+        batches: u64,
+    },
+    /// Fold the whole shards with which a folder begins into one file and remove theirs; workers may go on meanwhile.
+    #[command(after_help = "Example:\n  lampyris compact out/room")]
+    Compact {
+        /// Folder of the plan.
+        dir: PathBuf,
+    },
+    /// Compute batches drawn at random again and compare them with the checkpoints bit for bit; exit code 1 if any differs.
+    #[command(after_help = "Examples:\n  lampyris audit out/room\n  lampyris audit out/room --sample 100% --seed 7")]
+    Audit {
+        /// Folder of the plan.
+        dir: PathBuf,
+        /// Share of the batches in the checkpoints.
+        #[arg(long, value_name = "PERCENT", default_value = "1%", value_parser = share)]
+        sample: f64,
+        /// Another seed draws other batches.
+        #[arg(long, value_name = "S", default_value = "1")]
+        seed: u64,
+    },
     /// Fit spherical harmonics to a closed, star-shaped mesh, and say how far they are from it.
     #[command(after_help = "Examples:\n  lampyris fit head.glb --node Head --degree 32 -o head.harmonic\n  \
                       lampyris fit cube.obj --degree 32 --lanczos 1 --numbers f64 -o cube.harmonic")]
@@ -115,6 +143,15 @@ pub enum Command {
         /// The file to write; a picture with .png instead of .harmonic goes beside it.
         #[arg(short, long, value_name = "OUT.harmonic")]
         output: PathBuf,
+    },
+    /// Say what a photometric file holds (IES LM-63, EULUMDAT), and draw its polar curves.
+    #[command(after_help = "Example:\n  lampyris luminaire downlight.ies -o downlight.png")]
+    Luminaire {
+        /// An .ies or .ldt file.
+        file: PathBuf,
+        /// The picture [default: the name of the file with .png, in the current folder].
+        #[arg(short, long, value_name = "OUT.png")]
+        output: Option<PathBuf>,
     },
     /// Run cases with an exact answer and print reference, estimate, interval and z; exit code 1 if any fails.
     #[command(after_help = "Examples:\n  lampyris validate\n  lampyris validate --case sobolev/\n  \
@@ -171,6 +208,13 @@ pub enum Engine {
     Slurm,
     /// GNU parallel and ssh.
     Ssh,
+}
+
+/// A share such as `1%`.
+fn share(text: &str) -> Result<f64, String> {
+    let percent = text.strip_suffix('%').and_then(|number| number.parse().ok());
+    let share = percent.map(|percent: f64| percent / 100.0).filter(|share| *share > 0.0 && *share <= 1.0);
+    share.ok_or_else(|| "allowed: above 0% and at most 100%".to_owned())
 }
 
 /// The degree of a series.

@@ -5,19 +5,22 @@ mod watch;
 
 use crate::cli::Command;
 use lampyris::error::{Error, Result};
+use lampyris::farm::audit::{self, audit};
 use lampyris::farm::coordinator::{self, Options};
 use lampyris::farm::engines::missing::Missing;
 use lampyris::farm::engines::slurm;
 use lampyris::farm::folder::{Folder, plan_text};
 use lampyris::farm::inputs::{Prepared, prepare};
+use lampyris::farm::merge::compact::Compacted;
 use lampyris::farm::merge::goal::Look;
-use lampyris::farm::merge::{goal_reached, looks, merge};
+use lampyris::farm::merge::{self, goal_reached, looks};
 use lampyris::farm::plan::{Plan, human};
-use lampyris::farm::status::{Seen, Status, status};
+use lampyris::farm::status::{Seen, Status, now, status};
 use lampyris::farm::worker::{self, Order};
 use lampyris::fit;
 use lampyris::geometry::simd;
 use lampyris::report;
+use lampyris::scene::photometric_web::Photometry;
 use lampyris::validate::{self, Found};
 use std::fs::OpenOptions;
 use std::path::{Path, PathBuf};
@@ -64,16 +67,24 @@ pub fn execute(command: Command) -> Result<Outcome> {
         Command::Status { dir, json, .. } => show_status(&dir, json),
         Command::Merge { dirs, output } => merge_and_report(&dirs, output),
         Command::Submit(request) => submit::submit(request),
+        Command::Extend { dir, batches } => extend(&dir, batches),
+        Command::Compact { dir } => compact(&dir),
+        Command::Audit { dir, sample, seed } => {
+            let audited = audit(&audit::Order { folder: Folder::new(&dir), share: sample, seed })?;
+            let exit = if audited.faults.is_empty() { Exit::Done } else { Exit::Failed };
+            Ok(Outcome { text: audited.to_string(), exit })
+        }
         Command::Fit { mesh, node, degree, numbers, lanczos, output } => {
             let text = fit::run(&fit::Request { mesh, node, degree, numbers, lanczos, output })?;
             Ok(Outcome { text, exit: Exit::Done })
         }
+        Command::Luminaire { file, output } => luminaire(&file, output),
         Command::Validate { case, markdown, note } => validate(case.as_deref(), markdown.as_deref(), note.as_deref()),
     }
 }
 
 fn run(job: &Path, output: Option<PathBuf>, options: Options) -> Result<Outcome> {
-    let (folder, plan) = establish(job, output)?;
+    let (folder, plan) = planned(job, output)?;
     let reached = |folder: &Folder| Ok(goal_reached(std::slice::from_ref(folder))?.is_some());
     let before = match coordinator::run(&folder, &plan, options, &reached)? {
         coordinator::Ended::WasDone if plan.job.stop.is_some() => "nothing was left to do\n".to_owned(),
@@ -103,6 +114,18 @@ fn plan(job: &Path, output: Option<PathBuf>) -> Result<Outcome> {
         human(sizes.checkpoints),
     );
     Ok(Outcome { text, exit: Exit::Done })
+}
+
+/// The plan of `job`: the one that stands there where it is a folder.
+fn planned(job: &Path, output: Option<PathBuf>) -> Result<(Folder, Plan)> {
+    match output {
+        None if Folder::new(job).plan_path().exists() => {
+            let folder = Folder::new(job);
+            let plan = folder.read_plan()?;
+            Ok((folder, plan))
+        }
+        output => establish(job, output),
+    }
 }
 
 /// Plans `job` into its folder.
@@ -190,12 +213,12 @@ fn looks_cheap(folder: &Folder, status: &Status, most: u64) -> Result<bool> {
 
 fn merge_and_report(dirs: &[PathBuf], output: Option<PathBuf>) -> Result<Outcome> {
     let folders: Vec<Folder> = dirs.iter().map(|d| Folder::new(d)).collect();
-    let (plan, merged) = merge(&folders)?;
     let output = output.unwrap_or_else(|| dirs[0].clone());
     std::fs::create_dir_all(&output).map_err(Error::io(&output))?;
-    report::write(&plan, &merged, &output)?;
+    let (plan, merged) = merge::merge(&folders, &output)?;
+    let summary = report::write(&plan, &merged, &output)?;
     let exit = if merged.missing.is_empty() { Exit::Done } else { Exit::Incomplete };
-    let mut text = format!("{}results in {}\n", report::text_summary(&plan, &merged), output.display());
+    let mut text = format!("{summary}results in {}\n", output.display());
     if let ([folder], Exit::Incomplete) = (&folders[..], exit) {
         text += &slurm::go_on(folder, &missing(folder)?)?.unwrap_or_default();
     }
@@ -209,6 +232,37 @@ fn missing(folder: &Folder) -> Result<Missing> {
         true => Ok(Missing::of(&folder.read_plan()?, &status)),
         false => Err(Error::refused(folder.root(), status.refused.join("\n"))),
     }
+}
+
+fn extend(dir: &Path, batches: u64) -> Result<Outcome> {
+    let plan = Folder::new(dir).extend(batches)?;
+    let text = format!("{} batches, {} shards in {}\n", plan.job.run.batches, plan.shard_count(), dir.display());
+    Ok(Outcome { text, exit: Exit::Done })
+}
+
+fn compact(dir: &Path) -> Result<Outcome> {
+    let Compacted { shards, files } = merge::compact::compact(&Folder::new(dir), now())?;
+    let text = match shards {
+        0 => "nothing to compact: the first shard is not whole yet\n".to_owned(),
+        _ => format!("shards 0 .. {} are in one file, {files} files removed\n", shards - 1),
+    };
+    Ok(Outcome { text, exit: Exit::Done })
+}
+
+/// Says what a photometric file holds, and draws its polar curves.
+fn luminaire(file: &Path, output: Option<PathBuf>) -> Result<Outcome> {
+    let name = file.display().to_string();
+    let bytes = std::fs::read(file)
+        .map_err(|e| Error::input("command line", "FILE", &name, format!("an IES or EULUMDAT file ({e})")))?;
+    let photometry = Photometry::parse(&name, &bytes)?;
+    let stem = file.file_stem().unwrap_or_default();
+    let picture = output.unwrap_or_else(|| Path::new(stem).with_extension("png"));
+    // A bare name has an empty parent, which is no folder that can be opened.
+    let picture = if picture.parent() == Some(Path::new("")) { Path::new(".").join(picture) } else { picture };
+    let title = file.file_name().unwrap_or_default().to_string_lossy();
+    report::write_polar(&picture, &title, &photometry)?;
+    let text = format!("{}curves in {}\n", report::luminaire_text(&photometry), picture.display());
+    Ok(Outcome { text, exit: Exit::Done })
 }
 
 /// Runs the cases, shows each as soon as it is done, and writes the document `markdown` if one is wanted.

@@ -162,7 +162,7 @@ fn bad_values_in_a_job_are_named_with_field_value_and_range() {
         ("reflectance = 0.5\n[[sphere]]", "reflectance = 1.5\n[[sphere]]", "plane[0].reflectance = 1.5: 0 .. 1"),
         ("radius = 1.0", "radius = 0.0", "sphere[0].radius = 0: above 0, at most 1e6"),
         ("facing = \"outward\"", "facing = \"up\"", "unknown variant `up`, expected `inward` or `outward`"),
-        ("kind = \"omni\"", "kind = \"laser\"", "unknown variant `laser`, expected `omni`"),
+        ("kind = \"omni\"", "kind = \"laser\"", "unknown variant `laser`, expected one of `omni`"),
         ("[run]", "[stop]\nrelative_half_width = 0\nmax_batches = 4\n[run]", "stop.relative_half_width = 0: between"),
         ("[run]", "[stop]\nrelative_half_width = nan\nmax_batches = 4\n[run]", "stop.relative_half_width = NaN: betw"),
         ("[run]", "[stop]\nrelative_half_width = 0.1\n[run]", "missing field `max_batches`"),
@@ -211,7 +211,7 @@ fn jobs_without_receivers_light_or_text_are_refused() {
         format!("{head}{}", &tail[end..])
     };
     let dark = folder_with(&without("[[source]]", ""));
-    assert!(expect(dark.path(), 2, &["run", "job.toml"]).contains("scene = (missing): a scene file, or planes"));
+    assert!(expect(dark.path(), 2, &["run", "job.toml"]).contains("scene = (missing): a scene file, or at least one"));
     let blind = folder_with(&without("[[camera]]", "[[plane]]"));
     assert!(expect(blind.path(), 2, &["run", "job.toml"]).contains("receivers = 0: at least one [[camera]]"));
     fs::write(blind.path().join("job.toml"), [0xff, 0xfe, 0x00]).unwrap();

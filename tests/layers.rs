@@ -27,7 +27,7 @@ const FARM: [&[&str]; 9] = [
     &["folder", "realization", "pilot"],
     &["inputs", "checkpoint", "attempts"],
     &["status"],
-    &["worker", "coordinator", "merge", "engines"],
+    &["worker", "coordinator", "merge", "audit", "engines"],
     &["testing"],
 ];
 
@@ -232,7 +232,7 @@ fn threads_are_where_batches_are_computed_or_merged_and_in_the_loading_of_a_scen
         "farm/realization.rs",
         "farm/thinning.rs",
         "farm/worker.rs",
-        "farm/merge/mod.rs",
+        "farm/merge/passes.rs",
         "scene/",
         "geometry/",
     ];

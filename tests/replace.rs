@@ -82,3 +82,15 @@ fn what_cannot_be_replaced_is_refused_by_name() {
         assert!(message.contains(expected), "{replace}: {message}");
     }
 }
+
+#[test]
+fn another_degree_is_another_plan() {
+    let folder = folder(HEAD);
+    assert!(lampyris(&folder, &["plan", "job.toml", "-o", "out"]).status.success());
+    let job = fs::read_to_string(folder.path().join("job.toml")).unwrap();
+    fs::write(folder.path().join("job.toml"), job + "degree = 8\n").unwrap();
+    let out = lampyris(&folder, &["plan", "job.toml", "-o", "out"]);
+    let said = String::from_utf8(out.stderr).unwrap();
+    assert_eq!(out.status.code(), Some(2), "{said}");
+    assert!(said.contains("replace[0].degree: (none) in the plan, 8 now"), "{said}");
+}

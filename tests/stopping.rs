@@ -81,7 +81,11 @@ fn compare(histories: u32, half_width: f64, batches_per_shard: u64) -> (Outcome,
                 naive.take(estimate, quantile);
                 ended = true;
             }
-            if looks.contains(&n) && goal.look(n, |_, _| Some(estimate)).reached {
+            let look = |_, take: &mut dyn FnMut(Estimate)| {
+                take(estimate);
+                Ok(())
+            };
+            if looks.contains(&n) && goal.look(n, &look).unwrap().reached {
                 looked.take(estimate, quantile);
                 break;
             }

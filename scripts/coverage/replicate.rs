@@ -106,7 +106,15 @@ impl Replicate {
     }
 
     fn reaches(&self, goal: &Goal) -> bool {
-        goal.look(self.tally.batches(), |set, bin| self.estimate(set, bin)).reached
+        let estimates = |set: usize, take: &mut dyn FnMut(Estimate)| {
+            let bins = match &self.tally.sets[set] {
+                SetTally::Moments(m) => m.bins.len(),
+                SetTally::Replicates(r) => r.bins as usize,
+            };
+            (0..bins).filter_map(|bin| self.estimate(set, bin)).for_each(take);
+            Ok(())
+        };
+        goal.look(self.tally.batches(), &estimates).expect("nothing is read").reached
     }
 
     /// The estimate of a bin, direct light included; None without a receiver.

@@ -37,7 +37,7 @@ pub struct Attempt {
 /// [`Error::Io`]: where nothing can be written a worker need not begin.
 pub fn add(folder: &Folder, k: u64, attempt: &Attempt) -> Result<u64> {
     let path = folder.attempts_path(k);
-    durable::make_folder(path.parent().expect("attempts lie in a folder"))?;
+    durable::make_inside(path.parent().expect("attempts lie in a folder"))?;
     let mut line = serde_json::to_string(attempt).expect("numbers and a string have a JSON form");
     line.push('\n');
     let mut file = OpenOptions::new().create(true).append(true).open(&path).map_err(Error::io(&path))?;
@@ -106,6 +106,8 @@ mod tests {
         let (here, copy) = (Folder::new(&temp.path().join("a b")), Folder::new(&temp.path().join("copy")));
         let attempt = |started| Attempt { started, host: "n1".to_owned(), process: 7, batches: 2 };
         assert_eq!(read(&here, 3).unwrap(), []);
+        assert!(add(&here, 3, &attempt(10)).is_err(), "a folder that is not there is not made");
+        [&here, &copy].iter().for_each(|folder| std::fs::create_dir(folder.root()).unwrap());
         assert_eq!(add(&here, 3, &attempt(10)).unwrap(), 1);
         std::fs::OpenOptions::new().append(true).open(here.attempts_path(3)).unwrap().write_all(b"{\"sta\n").unwrap();
         assert_eq!(add(&here, 3, &attempt(20)).unwrap(), 2);

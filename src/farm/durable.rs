@@ -158,6 +158,17 @@ pub fn make_folder(path: &Path) -> Result<()> {
     sync_folder(folder_of(path))
 }
 
+/// Makes the folder at `path` where there is none, inside one that is there: what somebody has removed stays away.
+///
+/// # Errors
+/// [`Error::Io`].
+pub fn make_inside(path: &Path) -> Result<()> {
+    match std::fs::create_dir(path) {
+        Err(e) if e.kind() == ErrorKind::AlreadyExists => Ok(()),
+        other => other.map_err(Error::io(path)).and_then(|()| sync_folder(folder_of(path))),
+    }
+}
+
 fn folder_of(path: &Path) -> &Path {
     path.parent().expect("replaced files lie in a folder")
 }
@@ -178,11 +189,16 @@ fn beside(path: &Path, end: &str) -> String {
     format!(".{name}{end}")
 }
 
+/// Where the lock of the file at `path` lies.
+pub fn lock_path(path: &Path) -> PathBuf {
+    path.with_file_name(beside(path, ".lock"))
+}
+
 /// The lock beside `path`, released when dropped or when the process dies; None where there are no locks.
 fn lock_beside(path: &Path) -> Result<Option<File>> {
-    let lock_path: PathBuf = path.with_file_name(beside(path, ".lock"));
-    let opened = OpenOptions::new().create(true).truncate(false).write(true).open(&lock_path);
-    let file = opened.map_err(Error::io(&lock_path))?;
+    let lock = lock_path(path);
+    let opened = OpenOptions::new().create(true).truncate(false).write(true).open(&lock);
+    let file = opened.map_err(Error::io(&lock))?;
     Ok(file.lock().is_ok().then_some(file))
 }
 

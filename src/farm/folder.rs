@@ -4,6 +4,7 @@
 //! DIR/plan.toml                  the plan, readable
 //! DIR/inputs/<digest>.<ext>      the job file and every input file, by content
 //! DIR/shards/shard-000012.ckpt   one checkpoint for each shard
+//! DIR/shards/compacted.ckpt      the first shards together, once they have been compacted
 //! DIR/attempts/...               who has begun which shard; no number depends on it
 //! DIR/slurm/, DIR/ssh/           scripts, logs and copies of `lampyris submit`
 //! DIR/...                        results
@@ -25,6 +26,12 @@ const HEADING: &str = "\
 # Do not edit; change the job file and run it again on this folder.
 
 ";
+
+/// Begins the last line of a plan.
+const SEAL: &str = "\n# blake3 ";
+
+/// Name of the file of the first shards together.
+const COMPACTED: &str = "compacted.ckpt";
 
 /// Where a plan, its inputs, checkpoints and results lie.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -66,7 +73,12 @@ impl Folder {
         self.root.join("attempts").join(format!("shard-{k:06}.jsonl"))
     }
 
-    /// Every checkpoint there is, with its shard, in shard order.
+    /// The first shards together.
+    pub fn compaction_path(&self) -> PathBuf {
+        self.root.join("shards").join(COMPACTED)
+    }
+
+    /// Every checkpoint of a shard there is, with its shard, in shard order.
     ///
     /// # Errors
     /// [`Error::Refused`] for a `.ckpt` file whose name is that of no shard: it would be left out silently.
@@ -80,7 +92,7 @@ impl Folder {
         for entry in entries {
             let path = entry.map_err(Error::io(&shards))?.path();
             let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            if name.starts_with('.') || !name.ends_with(".ckpt") {
+            if name.starts_with('.') || name == COMPACTED || !name.ends_with(".ckpt") {
                 continue;
             }
             let number = name.strip_prefix("shard-").and_then(|n| n.strip_suffix(".ckpt")?.parse().ok());
@@ -110,6 +122,28 @@ impl Folder {
         let plan: Plan =
             toml::from_str(&text).map_err(|e| Error::refused(&path, format!("not a plan: {}", e.message())))?;
         check_plan(&plan, &path)?;
+        if !is_sealed(&text) {
+            return Err(Error::refused(&path, "edited or damaged: its text is not the one that was written"));
+        }
+        Ok(plan)
+    }
+
+    /// Sets the number of batches of the plan that stands here, with a goal its limit, to `batches`; the plan as it is then.
+    /// Checkpoints stay what they are: the beginning of their shards.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for fewer batches than are planned, or more than a plan may have; those of reading and writing.
+    pub fn extend(&self, batches: u64) -> Result<Plan> {
+        let mut plan = self.read_plan()?;
+        let before = plan.job.run.batches;
+        if batches < before {
+            let allowed = format!("at least {before}, the batches planned: moments cannot be cut back");
+            return Err(Error::input("command line", "--batches", batches, allowed));
+        }
+        plan.job.run.batches = batches;
+        plan.job.stop.iter_mut().for_each(|stop| stop.max_batches = batches);
+        check_plan(&plan, &self.plan_path())?;
+        self.establish(&plan, &[])?;
         Ok(plan)
     }
 
@@ -119,14 +153,7 @@ impl Folder {
     /// # Errors
     /// [`Error::Refused`] naming what differs from the plan that stands here; [`Error::Io`].
     pub fn establish(&self, plan: &Plan, files: &[(Input, Vec<u8>)]) -> Result<()> {
-        if self.plan_path().exists() {
-            let old = self.read_plan()?;
-            let obstacles = plan.obstacles(&old);
-            if !obstacles.is_empty() {
-                let reason = format!("the job is no longer the one planned here:\n  {}", obstacles.join("\n  "));
-                return Err(Error::refused(&self.plan_path(), reason));
-            }
-        }
+        self.check_obstacles(plan)?;
         for sub in ["inputs", "shards"] {
             durable::make_folder(&self.root.join(sub))?;
         }
@@ -137,11 +164,26 @@ impl Folder {
             }
         }
         // The plan comes last: a folder with a plan has all its inputs.
-        let text = plan_text(plan);
+        let text = sealed(&plan_text(plan));
         if fs::read_to_string(self.plan_path()).is_ok_and(|old| old == text) {
             return Ok(());
         }
-        durable::replace(&self.plan_path(), |w| w.write_all(text.as_bytes()))
+        // Of two that plan at once the second one sees what the first has written.
+        let allowed = || self.check_obstacles(plan).map(|()| true);
+        durable::replace_if(&self.plan_path(), |w| w.write_all(text.as_bytes()), allowed).map(|_| ())
+    }
+
+    /// Refuses a plan that cannot continue the one that stands here, if one does.
+    fn check_obstacles(&self, plan: &Plan) -> Result<()> {
+        if !self.plan_path().exists() {
+            return Ok(());
+        }
+        let obstacles = plan.obstacles(&self.read_plan()?);
+        if obstacles.is_empty() {
+            return Ok(());
+        }
+        let reason = format!("the job is no longer the one planned here:\n  {}", obstacles.join("\n  "));
+        Err(Error::refused(&self.plan_path(), reason))
     }
 
     /// The bytes of `input`, verified against its digest.
@@ -162,6 +204,16 @@ impl Folder {
 pub fn plan_text(plan: &Plan) -> String {
     let body = toml::to_string(plan).expect("a plan has a TOML form: checked numbers and string keys");
     format!("{HEADING}{body}")
+}
+
+/// `text` with a last line by which it is known again.
+fn sealed(text: &str) -> String {
+    format!("{text}{SEAL}{}\n", blake3::hash(text.as_bytes()).to_hex())
+}
+
+/// True for a whole text that [`sealed`] made.
+fn is_sealed(text: &str) -> bool {
+    text.rfind(SEAL).is_some_and(|at| sealed(&text[..at]) == text)
 }
 
 /// Refuses a plan that this program did not write or would compute otherwise.

@@ -12,7 +12,9 @@ use crate::geometry::Build;
 use crate::geometry::harmonic::MAX_DEGREE;
 use crate::geometry::harmonic::file::File;
 use crate::job::{Degree, Job};
+use crate::scene::photometric_web::Photometry;
 use crate::scene::{Model, Scene, gltf};
+use std::collections::HashMap;
 use std::fs;
 use std::path::{Component, Path};
 
@@ -41,12 +43,14 @@ pub fn prepare(path: &Path) -> Result<Prepared> {
     };
     let series = job.replacements.iter().enumerate().map(|(i, r)| read_series(path, i, &r.harmonic, &mut files));
     let series: Vec<File> = series.collect::<Result<_>>()?;
+    let webs: Vec<Photometry> =
+        job.luminaire_files().into_iter().map(|name| read_web(path, &job, name, &mut files)).collect::<Result<_>>()?;
     let kept = degree::is_open(&job).then(|| model.clone());
     // Planning asks few rays (one a pixel where a region names a node), and each worker builds the scene again.
-    let mut scene = Scene::built(replaced(model, &job, &file, &series)?, &job, Build::Quick)?;
+    let mut scene = Scene::built(furnished(model, &job, &file, &series, &webs)?, &job, Build::Quick)?;
     if let Some(model) = kept {
         degree::fix(&mut job, &scene);
-        scene = Scene::built(replaced(model, &job, &file, &series)?, &job, Build::Quick)?;
+        scene = Scene::built(furnished(model, &job, &file, &series, &webs)?, &job, Build::Quick)?;
     }
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let job_file = Input::of(&file_name(path), text.as_bytes());
@@ -67,24 +71,38 @@ pub fn prepare(path: &Path) -> Result<Prepared> {
 /// # Errors
 /// [`Error::Refused`] for a copy that is damaged; [`Error::Input`] for a scene that asks for a file not planned.
 pub fn load_scene(folder: &Folder, plan: &Plan) -> Result<Scene> {
-    let of_scene = plan.inputs.len().checked_sub(plan.job.replacements.len());
-    let Some((of_scene, of_series)) = of_scene.map(|count| plan.inputs.split_at(count)) else {
-        return Err(Error::input("plan", "inputs", plan.inputs.len(), "a file for each [[replace]]"));
+    let (of_scene, of_series, of_webs) = parts(plan)?;
+    let model = match of_scene.split_first() {
+        Some((first, others)) => {
+            let mut fetch = |uri: &str| match others.iter().find(|i| i.name == uri) {
+                Some(input) => folder.read_input(input),
+                None => Err(Error::input(&first.name, "uri", uri, "a file known to the plan")),
+            };
+            gltf::load(&first.name, &folder.read_input(first)?, &mut fetch)?
+        }
+        None => Model::default(),
     };
-    let Some((first, others)) = of_scene.split_first() else { return Scene::new(Model::default(), &plan.job) };
-    let bytes = folder.read_input(first)?;
-    let mut fetch = |uri: &str| match others.iter().find(|i| i.name == uri) {
-        Some(input) => folder.read_input(input),
-        None => Err(Error::input(&first.name, "uri", uri, "a file known to the plan")),
-    };
-    let model = gltf::load(&first.name, &bytes, &mut fetch)?;
     let series = of_series.iter().map(|input| File::parse(&input.name, &folder.read_input(input)?));
     let series: Vec<File> = series.collect::<Result<_>>()?;
-    Scene::new(replaced(model, &plan.job, "plan", &series)?, &plan.job)
+    let webs = of_webs.iter().map(|input| Photometry::parse(&input.name, &folder.read_input(input)?));
+    let webs: Vec<Photometry> = webs.collect::<Result<_>>()?;
+    Scene::new(furnished(model, &plan.job, "plan", &series, &webs)?, &plan.job)
 }
 
-/// `model` with the `series` of `job` in the place of the meshes that it names.
-fn replaced(mut model: Model, job: &Job, file: &str, series: &[File]) -> Result<Model> {
+/// The inputs of the scene itself, a series for each `[[replace]]`, and each file of a `[[luminaire]]` once.
+fn parts(plan: &Plan) -> Result<(&[Input], &[Input], &[Input])> {
+    let (series, webs) = (plan.job.replacements.len(), plan.job.luminaire_files().len());
+    let Some(of_scene) = plan.inputs.len().checked_sub(series + webs) else {
+        let allowed = "a file for each [[replace]], and those of each [[luminaire]]";
+        return Err(Error::input("plan", "inputs", plan.inputs.len(), allowed));
+    };
+    let (of_scene, others) = plan.inputs.split_at(of_scene);
+    let (of_series, of_webs) = others.split_at(series);
+    Ok((of_scene, of_series, of_webs))
+}
+
+/// `model` with the `series` of `job` in the place of the meshes that it names, and its luminaires with their `webs`.
+fn furnished(mut model: Model, job: &Job, file: &str, series: &[File], webs: &[Photometry]) -> Result<Model> {
     for (i, (replacement, whole)) in job.replacements.iter().zip(series).enumerate() {
         let degree = match replacement.degree {
             Some(Degree::Number(degree)) => degree as usize,
@@ -92,6 +110,10 @@ fn replaced(mut model: Model, job: &Job, file: &str, series: &[File]) -> Result<
         };
         let truncated = File { series: whole.series.truncated(degree), ..whole.clone() };
         model.replace((file, &format!("replace[{i}]")), &replacement.node, truncated)?;
+    }
+    let web_of: HashMap<&str, &Photometry> = job.luminaire_files().into_iter().zip(webs).collect();
+    for (i, luminaire) in job.luminaires.iter().enumerate() {
+        model.hang((file, &format!("luminaire[{i}]")), luminaire, web_of[luminaire.file.as_str()])?;
     }
     Ok(model)
 }
@@ -106,6 +128,19 @@ fn read_series(job_path: &Path, i: usize, name: &str, files: &mut Vec<(Input, Ve
     let file = File::parse(name, &bytes)?;
     files.push((Input::of(name, &bytes), bytes));
     Ok(file)
+}
+
+/// Reads the photometric file `name` of `job` at `job_path`, and adds it to `files`.
+fn read_web(job_path: &Path, job: &Job, name: &str, files: &mut Vec<(Input, Vec<u8>)>) -> Result<Photometry> {
+    let path = job_path.parent().unwrap_or(Path::new("")).join(name);
+    let bytes = fs::read(&path).map_err(|e| {
+        let first = job.luminaires.iter().position(|l| l.file == name).unwrap_or(0);
+        let allowed = format!("an IES or EULUMDAT file, relative to the job file ({e})");
+        Error::input(job_path.display(), format!("luminaire[{first}].file"), name, allowed)
+    })?;
+    let web = Photometry::parse(name, &bytes)?;
+    files.push((Input::of(name, &bytes), bytes));
+    Ok(web)
 }
 
 /// Loads the scene file `name` of the job at `job_path`; every file read is added to `files`, the scene first.

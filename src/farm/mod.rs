@@ -17,11 +17,13 @@
 //! status        headers and attempts -> progress
 //! worker        computes one shard
 //! coordinator   starts, watches, restarts worker processes
-//! merge         checkpoints -> one result, in parallel
+//! merge         checkpoints -> one result, in parallel; the first of them -> one checkpoint
+//! audit         batches computed again, and compared with checkpoints
 //! engines       carry shards to many machines: Slurm, ssh
 //! ```
 
 pub mod attempts;
+pub mod audit;
 pub mod checkpoint;
 pub mod coordinator;
 mod degree;

@@ -15,13 +15,14 @@ pub use goal::{GoalStatus, Seen, Verdict};
 pub use hosts::HostStatus;
 
 use super::attempts::{self, Attempt};
-use super::checkpoint::{Header, read_header};
+use super::checkpoint::{Header, read_compaction, read_header};
 use super::folder::Folder;
 use super::plan::Plan;
 use crate::error::{Error, Result};
 use crate::tally::statistics::median;
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::time::SystemTime;
 
 /// The progress of one shard.
@@ -84,6 +85,11 @@ pub struct Status {
     pub refused: Vec<String>,
 }
 
+/// The present \[s since 1970\].
+pub fn now() -> u64 {
+    SystemTime::UNIX_EPOCH.elapsed().map_or(0, |d| d.as_secs())
+}
+
 /// The progress of the plan in `folder`.
 ///
 /// # Errors
@@ -91,12 +97,13 @@ pub struct Status {
 pub fn status(folder: &Folder) -> Result<Status> {
     let plan = folder.read_plan()?;
     let (mut shards, mut refused) = (BTreeMap::new(), Vec::new());
+    let folded = kept(read_compaction(folder, &plan), &mut refused)?;
+    for (k, header) in (0..).zip(folded.iter().flat_map(|folded| folded.parts(&plan))) {
+        shards.insert(k, ShardStatus::new(&plan, k, &header));
+    }
     for (k, path) in folder.checkpoints()? {
-        match read_header(&path, &plan, k) {
-            Ok(Some(header)) => drop(shards.insert(k, ShardStatus::new(&plan, &header))),
-            Ok(None) => {}
-            Err(e @ Error::Refused { .. }) => refused.push(e.to_string()),
-            Err(e) => return Err(e),
+        if let Some(header) = kept(read_header(&path, &plan, k), &mut refused)? {
+            shards.entry(k).or_insert_with(|| ShardStatus::new(&plan, k, &header));
         }
     }
     for k in attempts::begun(folder)?.into_iter().filter(|&k| k < plan.shard_count()) {
@@ -106,17 +113,28 @@ pub fn status(folder: &Folder) -> Result<Status> {
     Ok(Status::new(&plan, shards.into_values().collect(), refused))
 }
 
+/// The header that was read; None, and why among `refused`, for a file that was refused.
+fn kept(read: Result<Option<Header>>, refused: &mut Vec<String>) -> Result<Option<Header>> {
+    match read {
+        Err(e @ Error::Refused { .. }) => {
+            refused.push(e.to_string());
+            Ok(None)
+        }
+        other => other,
+    }
+}
+
 impl ShardStatus {
-    /// From the header of a checkpoint.
-    pub fn new(plan: &Plan, header: &Header) -> Self {
-        let range = plan.shard(header.shard);
+    /// Of shard `k`, from the header of its checkpoint.
+    pub fn new(plan: &Plan, k: u64, header: &Header) -> Self {
+        let range = plan.shard(k);
         let mut shard = ShardStatus {
-            shard: header.shard,
+            shard: k,
             batches: header.batches(),
             of: range.end - range.start,
-            seconds: header.seconds,
+            seconds: header.seconds(),
             age_seconds: age(header.written),
-            host: header.host.clone(),
+            host: header.runs.last().map(|run| run.host.clone()).unwrap_or_default(),
             attempts: 0,
             active: false,
             relative_error_estimate: finite(header.relative_error),
@@ -139,6 +157,12 @@ impl ShardStatus {
             active: false,
             relative_error_estimate: None,
         }
+    }
+
+    /// The range of its batches that are done.
+    pub fn done(&self, plan: &Plan) -> Range<u64> {
+        let start = plan.shard(self.shard).start;
+        start..start + self.batches
     }
 
     /// Takes the attempts on this shard into account.
@@ -232,5 +256,5 @@ fn finite(x: f64) -> Option<f64> {
 
 /// Time since `written` \[s\]; 0 where the clock of another machine is ahead.
 fn age(written: u64) -> u64 {
-    SystemTime::UNIX_EPOCH.elapsed().map_or(0, |d| d.as_secs()).saturating_sub(written)
+    now().saturating_sub(written)
 }

@@ -1,6 +1,6 @@
 //! Plans, scores and tallies for the tests of this folder.
 
-use super::checkpoint::{Snapshot, write};
+use super::checkpoint::{Run, Snapshot, write};
 use super::folder::Folder;
 use super::plan::{Input, Plan, SceneSummary};
 use crate::error::Result;
@@ -113,10 +113,8 @@ pub fn save_tally(folder: &Folder, plan: &Plan, shard: u64, tally: &Tally, fixed
         shard,
         tally,
         fixed_direct: fixed,
-        seconds: 1.5,
+        runs: &[Run { batches: tally.batches(), host: "test".into(), instructions: "scalar".into(), seconds: 1.5 }],
         written: 1_700_000_000,
-        host: "test",
-        instructions: "scalar",
         relative_error: 0.25,
     };
     write(&path, &snapshot)

@@ -6,12 +6,13 @@
 mod signals;
 
 use super::attempts::{self, Attempt};
-use super::checkpoint::{self, Reader, Snapshot};
+use super::checkpoint::{self, Reader, Run, Snapshot, read_compaction};
 use super::durable;
 use super::folder::Folder;
 use super::inputs;
 use super::plan::Plan;
 use super::realization::Realization;
+use super::status::now;
 use crate::error::{Error, Result};
 use crate::geometry::simd::Path as Instructions;
 use crate::tally::statistics::{Estimate, median};
@@ -21,7 +22,7 @@ use nix::sys::signal::Signal;
 use nix::unistd::{Pid, getppid};
 use signals::Signals;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
 
 /// Bins of a set that the estimate of the error so far looks at, at most.
 const SAMPLED_BINS: usize = 4096;
@@ -91,6 +92,10 @@ pub fn work(order: &Order, begun: &(dyn Fn(&Begun) + Sync)) -> Result<Ended> {
         let allowed = format!("0 .. {}", plan.shard_count() - 1);
         return Err(Error::input("command line", "--shard", order.shard, allowed));
     }
+    let folded = read_compaction(&order.folder, &plan)?;
+    if folded.is_some_and(|folded| !folded.digests_of(&plan, order.shard).is_empty()) {
+        return Ok(Ended::Done);
+    }
     let work = Work::resume(&order.folder, &plan, order.shard)?;
     if work.missing() == 0 {
         return Ok(Ended::Done);
@@ -118,8 +123,8 @@ struct Work<'a> {
     tally: Tally,
     /// Direct light as the checkpoint has it; None without a checkpoint.
     fixed_direct: Option<Vec<Vec<f64>>>,
-    /// Time spent before this process \[s\].
-    seconds: f64,
+    /// Who computed what the checkpoint had when this process began.
+    before: Vec<Run>,
     /// Batches in the checkpoint on disk.
     saved: u64,
 }
@@ -128,13 +133,20 @@ impl<'a> Work<'a> {
     /// From the checkpoint, or from nothing.
     fn resume(folder: &Folder, plan: &'a Plan, shard: u64) -> Result<Self> {
         let path = folder.shard_path(shard);
-        let mut work =
-            Work { plan, shard, path, tally: Tally::new(&plan.sets()), fixed_direct: None, seconds: 0.0, saved: 0 };
+        let mut work = Work {
+            plan,
+            shard,
+            path,
+            tally: Tally::new(&plan.sets()),
+            fixed_direct: None,
+            before: Vec::new(),
+            saved: 0,
+        };
         if let Some(reader) = Reader::open(&work.path, plan, shard)? {
             work.tally = reader.tally()?;
             let fixed = (0..plan.sets().len()).map(|set| reader.fixed_direct(set)).collect::<Result<_>>()?;
             work.fixed_direct = Some(fixed);
-            work.seconds = reader.header().seconds;
+            work.before = reader.header().runs.clone();
             work.saved = work.tally.batches();
         }
         Ok(work)
@@ -197,16 +209,21 @@ impl<'a> Work<'a> {
 
     fn save(&mut self, fixed_direct: &[Vec<f64>], elapsed: Duration) -> Result<()> {
         // Many a tool that copies a planned folder leaves out what is empty.
-        durable::make_folder(self.path.parent().expect("a checkpoint lies in a folder"))?;
+        durable::make_inside(self.path.parent().expect("a checkpoint lies in a folder"))?;
+        let before: u64 = self.before.iter().map(|run| run.batches).sum();
+        let here = Run {
+            batches: self.tally.batches() - before,
+            host: host_name(),
+            instructions: Instructions::chosen()?.name().to_owned(),
+            seconds: elapsed.as_secs_f64(),
+        };
         let snapshot = Snapshot {
             plan: self.plan,
             shard: self.shard,
             tally: &self.tally,
             fixed_direct,
-            seconds: self.seconds + elapsed.as_secs_f64(),
+            runs: &Run::after(&self.before, here),
             written: now(),
-            host: &host_name(),
-            instructions: Instructions::chosen()?.name(),
             relative_error: relative_error(&self.tally, fixed_direct),
         };
         checkpoint::write(Path::new(&self.path), &snapshot)?;
@@ -237,11 +254,6 @@ impl Schedule {
         self.interval = (2 * self.interval).min(self.longest);
         self.next = elapsed + self.interval;
     }
-}
-
-/// Seconds since 1970 \[s\].
-fn now() -> u64 {
-    SystemTime::UNIX_EPOCH.elapsed().map_or(0, |d| d.as_secs())
 }
 
 fn host_name() -> String {

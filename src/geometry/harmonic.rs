@@ -7,27 +7,35 @@
 //! F(t) = |o + t d| - r((o + t d)/|o + t d|):  positive outside, negative inside, 0 on the surface
 //! F'   = c - (grad r, d)/|x|,                                  c = (x,d)/|x|
 //! F''  = (1 - c^2)/|x| - (w'Hw - 2 c (g,w) - (1 - c^2)(g,n))/|x|^2,  w = d - c n,  n = x/|x|
-//! |F''|  <= (M2 + M1)/R^2 + 1/R,                                          where |x| >= R
+//! -(M2/2 + sqrt(M2^2/4 + M1^2))/R^2 <= F'' <= the same positive + 1/R,      where |x| >= R
 //! |F'''| <= (M3 + 2.31 M2 + 2 M1)/R^3 + 1.16/R^2
 //! ```
 //!
 //! with M1, M2, M3 the bounds of the derivatives of r along great circles: along a line the angle a has a' = s/|x|,
-//! a'' = -2 s c/|x|^2, a''' = -2 (s^3 - 3 s c^2)/|x|^3, s^2 = 1 - c^2, and s^2 c <= 0.385. So where the parabola or the cubic that starts with
+//! a'' = -2 s c/|x|^2 (so s^2 M2 + 2 s c M1 bounds what r adds to F''), a''' = -2 (s^3 - 3 s c^2)/|x|^3, s^2 = 1 - c^2, and s^2 c <= 0.385. So where the parabola or the cubic that starts with
 //! these derivatives and falls below F by its bound stays positive there is no surface: steps to its zero pass none, and near a
 //! crossing they converge on it faster than Newton's. From inside -F is taken.
 
+pub(in crate::geometry) mod beside;
+mod bounds;
 pub mod file;
+mod horizon;
+mod lattice;
 mod placed;
+mod samples;
 mod series;
 mod shells;
 mod steps;
 
+pub use bounds::Bounds;
 pub use placed::Harmonic;
-pub use series::{Bend, Bounds, MAX_DEGREE, Series, Slope, basis, projection};
+pub use series::{Bend, MAX_DEGREE, Series, Slope, basis, projection};
 
 use crate::error::{Error, Result};
 use crate::math::{DVec3, PI};
-use shells::radii;
+use bounds::bends;
+use samples::Samples;
+use std::sync::Arc;
 use steps::{Taylor, safe_step};
 
 /// What the sum of a series and its comparison with |x| round, in units of its largest radius.
@@ -35,13 +43,15 @@ const ROUNDING: f64 = 1e-14;
 /// Steps after which a line that only grazes the surface counts as meeting it.
 const MAX_STEPS: usize = 4096;
 
+/// How far one look tells that a line is clear, at most, as a share of the distance from the centre.
+const CLEAR: f64 = 0.25;
+
 /// A series as a surface, in its own coordinates.
 #[derive(Clone, Debug)]
 pub struct Star {
     series: Series,
     bounds: Bounds,
-    /// No radius is less, none more.
-    radii: (f64, f64),
+    samples: Arc<Samples>,
 }
 
 /// Where a line crosses a surface.
@@ -68,13 +78,13 @@ impl Star {
     /// # Errors
     /// [`Error::Input`] unless every radius is certainly positive.
     pub fn new(series: Series) -> Result<Star> {
-        let bounds = series.bounds();
-        let radii = radii(&series, &bounds);
-        if radii.0 <= 0.0 {
+        let samples = Samples::new(&series);
+        let bounds = samples.bounds();
+        if bounds.low <= 0.0 {
             let allowed = "a radius above 0 in every direction, by the bounds of its derivatives too";
-            return Err(Error::input("series", "least radius", radii.0, allowed));
+            return Err(Error::input("series", "least radius", bounds.low, allowed));
         }
-        Ok(Star { series, bounds, radii })
+        Ok(Star { series, bounds, samples: Arc::new(samples) })
     }
 
     /// The series.
@@ -84,13 +94,13 @@ impl Star {
 
     /// No radius is less than the first, none more than the second.
     pub fn radii(&self) -> (f64, f64) {
-        self.radii
+        (self.bounds.low, self.bounds.high)
     }
 
     /// True for points inside.
     pub fn contains(&self, p: DVec3) -> bool {
         let length = p.length();
-        length < self.radii.0 || (length < self.radii.1 && length < self.series.value(p / length))
+        length < self.bounds.low || (length < self.bounds.high && length < self.series.value(p / length))
     }
 
     /// Outward unit normal in the direction of the unit vector `n0`, and the area of the surface for each unit of solid angle there.
@@ -102,7 +112,7 @@ impl Star {
     pub fn first_crossing(&self, o: DVec3, d: DVec3, end: f64) -> Option<Crossing> {
         let nearest = -o.dot(d);
         let across2 = (o + nearest * d).length_squared();
-        let (low, high) = self.radii;
+        let (low, high) = self.radii();
         let reach2 = high * high - across2;
         if reach2 < 0.0 {
             return None;
@@ -114,7 +124,9 @@ impl Star {
         let core = nearest - half_core..nearest + half_core;
         let floor = ROUNDING * high;
         let least = low.max(across2.sqrt());
-        let bounds = self.derivatives(least);
+        // A step to the end, and beyond the last place that is looked at.
+        let enough = |at: f64| (end - at) * (1.0 + ROUNDING) + floor;
+        let within = |x: DVec3, at: f64| least.max(x.length() - enough(at));
         // Entering the ball around the surface is being outside; else the first look tells.
         let (mut side, mut height) = (if at > 0.0 { 1.0 } else { 0.0 }, None);
         for _ in 0..MAX_STEPS {
@@ -125,7 +137,17 @@ impl Star {
                 (side, at) = (-1.0, core.end);
                 continue;
             }
-            let here = self.height(o + at * d, d);
+            let x = o + at * d;
+            let (guess, errors) = self.samples.height(x, d);
+            let guessed = if side == 0.0 { guess.value.signum() } else { side };
+            if guessed * guess.value > 2.0 * errors.value {
+                side = guessed;
+                let bounds = self.derivatives(within(x, at), side);
+                let next = at + safe_step(&guess.times(side).less(errors), bounds, enough(at));
+                at = if side < 0.0 && at < core.start { next.min(core.end) } else { next };
+                continue;
+            }
+            let here = self.height(x, d);
             if side == 0.0 {
                 side = if here.along.value < 0.0 { -1.0 } else { 1.0 };
                 if here.along.value.abs() <= floor && here.along.first * side < 0.0 {
@@ -138,7 +160,7 @@ impl Star {
             if along.value <= floor && (along.first <= 0.0 || along.value < -floor) {
                 break;
             }
-            let step = safe_step(&along, bounds);
+            let step = safe_step(&along, self.derivatives(within(x, at), side), enough(at));
             // From inside the bound holds outside the core only, beyond which all is known.
             let next = at + step;
             let next = if side < 0.0 && at < core.start { next.min(core.end) } else { next };
@@ -152,29 +174,27 @@ impl Star {
         Some(Crossing { distance: at, position: height.slope.value * height.direction, normal })
     }
 
-    /// Bounds of the second and third derivatives of F where |x| is at least `least`.
-    fn derivatives(&self, least: f64) -> [f64; 2] {
+    /// Bounds of the second and third derivatives of F, or of -F where `side` is negative, where |x| is at least `least`: of how far
+    /// the second falls, of how far the third goes either way.
+    fn derivatives(&self, least: f64, side: f64) -> [f64; 2] {
         let Bounds { first, second, third, .. } = self.bounds;
         let square = least * least;
-        let of_second = (second + first) / square + 1.0 / least;
+        // |x| itself only bends up.
+        let of_length = if side < 0.0 { 1.0 / least } else { 0.0 };
+        let of_second = (0.5 * second + (0.25 * second * second + first * first).sqrt()) / square + of_length;
         [of_second, (third + 2.31 * second + 2.0 * first) / (square * least) + 1.16 / square]
     }
 
-    fn height(&self, x: DVec3, d: DVec3) -> Height {
+    /// How far from `x` outside, where the series has the derivatives `bend`, the line along the unit vector `d` is certain to meet
+    /// nothing, up to `enough`.
+    pub(in crate::geometry) fn clear(&self, x: DVec3, d: DVec3, enough: f64, bend: &Bend) -> f64 {
         let length = x.length();
-        let direction = x / length;
-        let bend = self.series.bend(direction);
-        let slope = bend.slope(direction);
-        let c = direction.dot(d);
-        let w = d - c * direction;
-        let across = 1.0 - c * c;
-        let turned = w.dot(bend.hessian * w) - 2.0 * c * bend.g.dot(w) - across * bend.g.dot(direction);
-        let along = Taylor {
-            value: length - slope.value,
-            first: c - slope.gradient.dot(d) / length,
-            second: (across - turned / length) / length,
-        };
-        Height { along, slope, direction }
+        let least = self.bounds.low.max((1.0 - CLEAR) * length);
+        safe_step(&height(x, d, bend).along, self.derivatives(least, 1.0), enough.min(CLEAR * length))
+    }
+
+    fn height(&self, x: DVec3, d: DVec3) -> Height {
+        height(x, d, &self.series.bend(x.normalize()))
     }
 
     /// Volume, by a rule that is exact for r^3.
@@ -198,7 +218,27 @@ impl Star {
     }
 }
 
+/// F and its derivatives at `x` along the unit vector `d`, where the series has the derivatives `bend`.
+fn height(x: DVec3, d: DVec3, bend: &Bend) -> Height {
+    let length = x.length();
+    let direction = x / length;
+    let slope = bend.slope(direction);
+    let c = direction.dot(d);
+    let w = d - c * direction;
+    let across = 1.0 - c * c;
+    let turned = w.dot(bend.hessian * w) - 2.0 * c * bend.g.dot(w) - across * bend.g.dot(direction);
+    let along = Taylor {
+        value: length - slope.value,
+        first: c - slope.gradient.dot(d) / length,
+        second: (across - turned / length) / length,
+    };
+    Height { along, slope, direction }
+}
+
 fn normal_and_area(slope: &Slope, n0: DVec3) -> (DVec3, f64) {
     let across = slope.value * n0 - slope.gradient;
     (across.normalize(), slope.value * across.length())
 }
+
+#[cfg(test)]
+mod tests;

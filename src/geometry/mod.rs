@@ -111,9 +111,9 @@ impl Geometry {
         self.mesh.len() as u64
     }
 
-    /// Memory of triangles and acceleration structure \[bytes\].
+    /// Memory of triangles, acceleration structure and what star-shaped objects add to their series \[bytes\].
     pub fn bytes(&self) -> u64 {
-        self.mesh.bytes()
+        self.mesh.bytes() + self.harmonics.iter().map(Harmonic::bytes).sum::<u64>()
     }
 
     /// Corners of the triangle `primitive` \[m\], as the rays see it.

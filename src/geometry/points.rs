@@ -1,6 +1,7 @@
 //! Points that the visibility kernel takes together: a tile, its groups and bundles with the boxes around them.
 
 use super::Geometry;
+use super::harmonic::beside::TileBeside;
 use super::simd::{Isa, Vector};
 use super::visibility::{BUNDLE, BUNDLES, GROUP, Lanes};
 use crate::math::{DVec3, Vec3};
@@ -21,10 +22,10 @@ pub struct Points {
     pub(super) far: Lanes,
     /// Of each plane, the points in front of it and those behind it.
     pub(super) sides: Vec<[Lanes; 2]>,
-    /// Of each sphere, then of each star-shaped object, the points inside.
+    /// Of each sphere, the points inside.
     pub(super) inside: Vec<Lanes>,
-    /// Of each star-shaped object, the points inside or just outside.
-    pub(super) near: Vec<Lanes>,
+    /// Of each star-shaped object, where they are.
+    pub(super) beside: Vec<TileBeside>,
 }
 
 impl Points {
@@ -41,7 +42,7 @@ impl Points {
             far: [0; BUNDLES],
             sides: Vec::new(),
             inside: Vec::new(),
-            near: Vec::new(),
+            beside: Vec::new(),
         };
         for (i, &point) in points.iter().enumerate() {
             let (bundle, lane) = (i / BUNDLE, i % BUNDLE);
@@ -64,8 +65,7 @@ impl Points {
         let sides = |p: &super::Plane| [where_true(&|q| p.height(q) > 0.0), where_true(&|q| p.height(q) < 0.0)];
         tile.sides = geometry.planes.iter().map(sides).collect();
         tile.inside = geometry.spheres.iter().map(|s| where_true(&|q| s.contains(q))).collect();
-        tile.inside.extend(geometry.harmonics.iter().map(|h| where_true(&|q| h.contains(q))));
-        tile.near = geometry.harmonics.iter().map(|h| where_true(&|q| h.is_near(q))).collect();
+        tile.beside = geometry.harmonics.iter().map(|h| TileBeside::new(h, points)).collect();
         tile
     }
 

@@ -65,9 +65,8 @@ impl Geometry {
         for (sphere, inside) in self.spheres.iter().zip(&points.inside) {
             shadow_of_sphere(sphere, apex, points, inside, seen);
         }
-        let inside = &points.inside[self.spheres.len()..];
-        for (harmonic, (inside, near)) in self.harmonics.iter().zip(inside.iter().zip(&points.near)) {
-            harmonic.hide(apex, points, [inside, near], seen, scratch);
+        for (harmonic, beside) in self.harmonics.iter().zip(&points.beside) {
+            harmonic.hide(apex, points, beside, seen, scratch);
         }
     }
 }

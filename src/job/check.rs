@@ -2,7 +2,7 @@
 
 use super::{
     Camera, Degree, DegreeWord, Estimator, Gonio, Grid, Job, Kept, Ratio, ReceiverKind, Region, Replacement, Roulette,
-    Sampling, Source, Stop,
+    Sampling, Stop, lights,
 };
 use crate::error::{Error, Result};
 use std::collections::HashSet;
@@ -48,7 +48,8 @@ pub(super) fn check(job: &Job, file: &str) -> Result<()> {
         check_stop(&c, stop, job)?;
     }
     check_estimator(&c, job)?;
-    check_surfaces(&c, job)
+    check_surfaces(&c, job)?;
+    lights::check(&c, job)
 }
 
 /// Counting on surface elements needs elements: only the cells of a grid are any.
@@ -281,13 +282,7 @@ fn check_surfaces(c: &Checker, job: &Job) -> Result<()> {
     for (i, replacement) in job.replacements.iter().enumerate() {
         check_replacement(c, &format!("replace[{i}]"), replacement, job)?;
     }
-    for (i, Source::Omni { position, intensity }) in job.sources.iter().enumerate() {
-        c.position(&format!("source[{i}].position"), *position)?;
-        let fits = *intensity > 0.0 && *intensity <= 1e12;
-        c.that(&format!("source[{i}].intensity"), intensity, fits, "above 0, at most 1e12 cd")?;
-    }
-    let lit = job.scene.is_some() || !job.sources.is_empty();
-    c.that("scene", "(missing)", lit, "a scene file, or planes, spheres and at least one [[source]]")
+    Ok(())
 }
 
 fn check_replacement(c: &Checker, at: &str, replacement: &Replacement, job: &Job) -> Result<()> {
@@ -305,12 +300,13 @@ fn check_replacement(c: &Checker, at: &str, replacement: &Replacement, job: &Job
     c.that(&format!("{at}.degree"), "auto", !auto || !job.cameras.is_empty(), "a number where there is no [[camera]]")
 }
 
-struct Checker<'a> {
+/// Refuses what does not hold, by field, value and what is allowed.
+pub(super) struct Checker<'a> {
     file: &'a str,
 }
 
 impl Checker<'_> {
-    fn that(&self, field: &str, value: impl ToString, holds: bool, allowed: &str) -> Result<()> {
+    pub(super) fn that(&self, field: &str, value: impl ToString, holds: bool, allowed: &str) -> Result<()> {
         if holds { Ok(()) } else { Err(Error::input(self.file, field, value, allowed)) }
     }
 
@@ -324,16 +320,16 @@ impl Checker<'_> {
         self.that(field, value, (low..=high).contains(&value), &format!("{low} .. {high}"))
     }
 
-    fn share(&self, field: &str, value: f64) -> Result<()> {
+    pub(super) fn share(&self, field: &str, value: f64) -> Result<()> {
         self.that(field, value, (0.0..=1.0).contains(&value), "0 .. 1")
     }
 
-    fn position(&self, field: &str, p: [f64; 3]) -> Result<()> {
+    pub(super) fn position(&self, field: &str, p: [f64; 3]) -> Result<()> {
         let fits = p.iter().all(|x| x.abs() <= MAX_METRES);
         self.that(field, Shown(p), fits, "three finite numbers of at most 1e6 m")
     }
 
-    fn direction(&self, field: &str, n: [f64; 3]) -> Result<()> {
+    pub(super) fn direction(&self, field: &str, n: [f64; 3]) -> Result<()> {
         let fits = n.iter().all(|x| x.abs() <= MAX_METRES) && length(n) >= 1e-9;
         self.that(field, Shown(n), fits, "three finite numbers, not all zero")
     }

@@ -4,9 +4,11 @@
 //! the job file. Unknown keys are refused. A [`Job`] is plain data: reading it opens one file and nothing else.
 
 mod check;
+mod lights;
 mod receivers;
 mod replacement;
 
+pub use lights::{Extent, Luminaire, Source};
 pub use receivers::{Camera, Gonio, Grid, Kept, Point, ReceiverKind, Region, SetShape, View};
 pub use replacement::{Degree, DegreeWord, Replacement};
 
@@ -18,7 +20,7 @@ use std::path::Path;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Job {
-    /// The glTF scene, relative to the job file; optional when planes, spheres and sources are given.
+    /// The glTF scene, relative to the job file; optional when sources or luminaires are given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scene: Option<String>,
     /// How much is computed, with which seed.
@@ -60,6 +62,9 @@ pub struct Job {
     /// Light sources beside those of the scene file.
     #[serde(default, rename = "source", skip_serializing_if = "Vec::is_empty")]
     pub sources: Vec<Source>,
+    /// Photometric webs at their places.
+    #[serde(default, rename = "luminaire", skip_serializing_if = "Vec::is_empty")]
+    pub luminaires: Vec<Luminaire>,
 }
 
 /// Default histories of a batch in a job with maps.
@@ -259,19 +264,6 @@ pub enum Facing {
     /// The outside reflects.
     #[default]
     Outward,
-}
-
-/// `[[source]]`: a light source given in the job.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, tag = "kind", rename_all = "lowercase")]
-pub enum Source {
-    /// The same intensity in all directions.
-    Omni {
-        /// Position \[m\].
-        position: [f64; 3],
-        /// Luminous intensity \[cd\].
-        intensity: f64,
-    },
 }
 
 impl Job {

@@ -38,6 +38,8 @@ pub enum Domain {
     Direction,
     /// Paths from the receivers of one receiver set; the index is `batch * bins + bin`.
     Reverse,
+    /// Batches that an audit computes again; the index is 0.
+    Audit,
 }
 
 impl Domain {
@@ -52,6 +54,7 @@ impl Domain {
             Domain::Emitter => "lampyris 1 emitter",
             Domain::Direction => "lampyris 1 direction",
             Domain::Reverse => "lampyris 1 reverse",
+            Domain::Audit => "lampyris 1 audit",
         }
     }
 }
@@ -98,6 +101,7 @@ fn mix(mut z: u64) -> u64 {
 /// ```text
 /// choice of the source    1    (none with a single source; every emissive triangle is one)
 /// omni, spot, parallel    2    direction, or place in the beam
+/// luminaire with extent   2+1+2  direction; face, point of it
 /// emissive triangle       2+2  point, direction; 1 between them for the side, where both sides emit
 /// Lambert reflection      2    direction
 /// glossy reflection       1+2  part, direction; none for the direction of a mirror

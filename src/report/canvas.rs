@@ -72,6 +72,33 @@ impl Canvas {
         self.fill([left + wide - 1, top], [1, tall], colour);
     }
 
+    /// Draws a line through `points`, given in pixels, `width` pixels wide and smooth at its edges.
+    pub fn stroke(&mut self, points: &[[f64; 2]], width: f64, colour: Rgb) {
+        for pair in points.windows(2) {
+            self.segment([pair[0], pair[1]], 0.5 * width, colour);
+        }
+    }
+
+    fn segment(&mut self, [a, b]: [[f64; 2]; 2], half: f64, colour: Rgb) {
+        let reach = |axis: usize, size: u32| {
+            let (low, high) = (a[axis].min(b[axis]) - half - 1.0, a[axis].max(b[axis]) + half + 1.0);
+            (low.max(0.0) as u32, (high.max(0.0) as u32 + 1).min(size))
+        };
+        let ((left, right), (top, bottom)) = (reach(0, self.width), reach(1, self.height));
+        for (x, y) in (top..bottom).flat_map(|y| (left..right).map(move |x| (x, y))) {
+            let distance = distance([f64::from(x) + 0.5, f64::from(y) + 0.5], a, b);
+            self.blend(x, y, colour, (half + 0.5 - distance).clamp(0.0, 1.0));
+        }
+    }
+
+    /// Lays `colour` over the pixel, of which it covers the share `cover`.
+    fn blend(&mut self, x: u32, y: u32, colour: Rgb, cover: f64) {
+        let at = (y as usize * self.width as usize + x as usize) * 3;
+        for (below, above) in self.rgb[at..at + 3].iter_mut().zip(colour) {
+            *below = (f64::from(*below) + cover * (f64::from(above) - f64::from(*below))).round() as u8;
+        }
+    }
+
     /// Writes `text` in black, its upper left corner at `at`.
     pub fn text(&mut self, at: [u32; 2], text: &str, font: Font) {
         let style = MonoTextStyle::new(font.mono(), Rgb888::BLACK);
@@ -95,6 +122,16 @@ impl Canvas {
         let at = (y as usize * self.width as usize + x as usize) * 3;
         self.rgb[at..at + 3].copy_from_slice(&colour);
     }
+}
+
+/// Distance of `p` from the segment from `a` to `b`.
+fn distance(p: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
+    let (along, to) = ([b[0] - a[0], b[1] - a[1]], [p[0] - a[0], p[1] - a[1]]);
+    let square = along[0] * along[0] + along[1] * along[1];
+    let share = if square > 0.0 { (along[0] * to[0] + along[1] * to[1]) / square } else { 0.0 };
+    let share = share.clamp(0.0, 1.0);
+    let off = [to[0] - share * along[0], to[1] - share * along[1]];
+    (off[0] * off[0] + off[1] * off[1]).sqrt()
 }
 
 impl OriginDimensions for Canvas {

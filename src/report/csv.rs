@@ -41,14 +41,14 @@ pub(super) fn write_grid(plan: &Plan, merged: &Merged, values: &SetValues, to: &
     let mut header = HEADER.to_vec();
     header.splice(FAMILY_AT..FAMILY_AT, FAMILY);
     table.write_record(header)?;
-    let quantile = quantile_of(values, plan.job.run.confidence, merged.batches);
+    let quantile = quantile_of(values, plan.job.run.confidence, merged.batches)?;
     let columns = values.shape.width as usize;
-    for (index, bin) in values.bins.iter().enumerate() {
+    values.each(|index, bin| {
         let place = [index, index % columns, index / columns];
         let mut row = row(place, grid.position(index), grid.normal, bin, &note(bin, plan, merged));
         row.splice(FAMILY_AT..FAMILY_AT, family_interval(bin, quantile).map(|x| format!("{x:?}")));
-        table.write_record(row)?;
-    }
+        Ok(table.write_record(row)?)
+    })?;
     table.flush()
 }
 
@@ -58,8 +58,8 @@ pub(super) fn write_points(plan: &Plan, merged: &Merged, points: &[SetValues], t
     table.write_record(["name"].iter().chain(&HEADER))?;
     for (index, (values, point)) in points.iter().zip(&plan.job.points).enumerate() {
         assert_eq!(values.shape.name, point.name, "points come in job order");
-        let bin = &values.bins[0];
-        let row = row([index, 0, 0], point.position, point.normal, bin, &note(bin, plan, merged));
+        let bin = values.single()?;
+        let row = row([index, 0, 0], point.position, point.normal, &bin, &note(&bin, plan, merged));
         table.write_record([point.name.clone()].iter().chain(&row))?;
     }
     table.flush()

@@ -10,6 +10,7 @@ use crate::tally::derived::{Bounded, Family, Series, family_quantile, ratio};
 use crate::tally::health::{Common, Counted, Health, Mark, Signs, health};
 use crate::tally::statistics::{Estimate, student_quantile, variance_of_variance};
 use serde::Serialize;
+use std::io;
 
 const MEAN: &str = "mean over the points in each batch, Student's interval over the batches";
 const MINIMUM: &str = "least lower and least upper end of intervals that hold for every point together (Bonferroni): \
@@ -72,28 +73,40 @@ pub(super) struct OfRatio {
 }
 
 /// What is derived from the set number `set` of the job, with `values` and `health` of its mean.
-pub(super) fn of_set(plan: &Plan, merged: &Merged, set: usize, values: &SetValues, health: Health) -> OfSet {
-    let SetResult::Replicates { scores, fixed_direct } = &merged.sets[set] else { return OfSet::default() };
+///
+/// # Errors
+/// Those of reading the bins.
+pub(super) fn of_set(
+    plan: &Plan,
+    merged: &Merged,
+    set: usize,
+    values: &SetValues,
+    health: Health,
+) -> io::Result<OfSet> {
+    let SetResult::Replicates { scores, fixed_direct } = &merged.sets[set] else { return Ok(OfSet::default()) };
     let confidence = plan.job.run.confidence;
     let family = Family::new(scores, fixed_direct);
-    match values.shape.kind {
+    Ok(match values.shape.kind {
         ReceiverKind::Region => {
             let mean = Quantity::of_mean(&family.mean(), confidence, REGION).marked(health);
             OfSet { interval: Some(mean), derived: None }
         }
         ReceiverKind::Grid => {
             let of_grid = OfGrid::new(&family, merged.batches, confidence);
-            OfSet { interval: None, derived: Some(of_grid.marked(health, health_of_least(values))) }
+            OfSet { interval: None, derived: Some(of_grid.marked(health, health_of_least(values)?)) }
         }
         ReceiverKind::Camera | ReceiverKind::Gonio | ReceiverKind::Point => OfSet::default(),
-    }
+    })
 }
 
 /// The marks of the mean over the bins of the set number `set`; of one bin they are its own.
-pub(super) fn health_of_mean(plan: &Plan, merged: &Merged, set: usize, values: &SetValues) -> Health {
-    let SetResult::Replicates { scores, fixed_direct } = &merged.sets[set] else { return Health::default() };
-    if let [bin] = &values.bins[..] {
-        return bin.health.unwrap_or_default();
+///
+/// # Errors
+/// Those of reading the bins.
+pub(super) fn health_of_mean(plan: &Plan, merged: &Merged, set: usize, values: &SetValues) -> io::Result<Health> {
+    let SetResult::Replicates { scores, fixed_direct } = &merged.sets[set] else { return Ok(Health::default()) };
+    if values.shape.bins() == 1 {
+        return Ok(values.single()?.health.unwrap_or_default());
     }
     let family = Family::new(scores, fixed_direct);
     let mean = family.mean();
@@ -109,14 +122,21 @@ pub(super) fn health_of_mean(plan: &Plan, merged: &Merged, set: usize, values: &
         vov: variance_of_variance(mean.scores.iter().copied()),
         caustic: family.caustic(),
     };
-    health(&Signs::of(&common, &counted, mean.fixed, None))
+    Ok(health(&Signs::of(&common, &counted, mean.fixed, None)))
 }
 
 /// The marks of the bin with the least value.
-fn health_of_least(values: &SetValues) -> Health {
-    let existing = values.bins.iter().filter(|b| b.health.is_some());
-    let least = existing.min_by(|a, b| a.value.total_cmp(&b.value));
-    least.and_then(|bin| bin.health).unwrap_or_default()
+fn health_of_least(values: &SetValues) -> io::Result<Health> {
+    let mut least: Option<(f64, Health)> = None;
+    values.each(|_, bin| {
+        if let Some(health) = bin.health
+            && least.is_none_or(|(value, _)| bin.value.total_cmp(&value).is_lt())
+        {
+            least = Some((bin.value, health));
+        }
+        Ok(())
+    })?;
+    Ok(least.map(|(_, health)| health).unwrap_or_default())
 }
 
 /// The ratios of the job, in its order; `healths` are those of the means of its sets.
@@ -149,9 +169,16 @@ pub(super) fn family_interval(bin: &Bin, quantile: f64) -> [f64; 2] {
 }
 
 /// The quantile of the family of all points of `values` that have a receiver.
-pub(super) fn quantile_of(values: &SetValues, confidence: f64, batches: u64) -> f64 {
-    let points = values.bins.iter().filter(|b| b.status != Status::NoReceiver).count();
-    family_quantile(confidence, points, batches)
+///
+/// # Errors
+/// Those of reading a map that is kept in a file.
+pub(super) fn quantile_of(values: &SetValues, confidence: f64, batches: u64) -> io::Result<f64> {
+    let mut points = 0;
+    values.each(|_, bin| {
+        points += usize::from(bin.status != Status::NoReceiver);
+        Ok(())
+    })?;
+    Ok(family_quantile(confidence, points, batches))
 }
 
 impl Quantity {

@@ -9,11 +9,14 @@ use super::missing_text;
 use super::values::{Bin, SetValues, unit};
 use crate::farm::merge::Merged;
 use crate::farm::plan::Plan;
-use ::exr::image::write::WritableImage;
-use ::exr::image::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer};
+use ::exr::block::writer::ChunksWriter;
+use ::exr::block::{BlockIndex, UncompressedBlock};
+use ::exr::compression::Compression;
 use ::exr::math::Vec2;
-use ::exr::meta::attribute::{AttributeValue, Chromaticities, Text};
-use ::exr::meta::header::LayerAttributes;
+use ::exr::meta::BlockDescription;
+use ::exr::meta::attribute::{AttributeValue, ChannelDescription, Chromaticities, LineOrder, SampleType, Text};
+use ::exr::meta::header::{Header, ImageAttributes, LayerAttributes};
+use smallvec::smallvec;
 use std::io::{Result, Seek, Write};
 
 /// Name of a channel and where its numbers come from.
@@ -41,18 +44,74 @@ const REC709: Chromaticities = Chromaticities {
     white: Vec2(0.3127, 0.3290),
 };
 
-/// Writes the map `values` to `to`.
+/// Lines that are compressed together.
+const LINES: usize = 16;
+
+/// Writes the map `values` to `to`, some lines at a time.
 pub(super) fn write(plan: &Plan, merged: &Merged, values: &SetValues, to: &mut (impl Write + Seek)) -> Result<()> {
-    let channel = |&(name, number): &Channel| {
-        let samples = values.bins.iter().map(|b| number(b) as f32).collect();
-        AnyChannel::new(name, FlatSamples::F32(samples))
-    };
-    let channels = AnyChannels::sort(CHANNELS.iter().map(channel).collect());
-    let size = Vec2(values.shape.width as usize, values.shape.height as usize);
-    let layer = Layer::new(size, attributes(plan, merged, values), Encoding::SMALL_LOSSLESS, channels);
-    let mut image = Image::from_layer(layer);
-    image.attributes.chromaticities = Some(REC709);
-    image.write().to_buffered(to).map_err(|e| std::io::Error::other(e.to_string()))
+    let mut channels = CHANNELS;
+    channels.sort_unstable_by_key(|(name, _)| *name);
+    let [width, height] = [values.shape.width as usize, values.shape.height as usize];
+    let described = channels.iter().map(|(name, _)| ChannelDescription::named(*name, SampleType::F32)).collect();
+    let mut shared = ImageAttributes::with_size((width, height));
+    shared.chromaticities = Some(REC709);
+    let header = Header::new(Text::default(), (width, height), described)
+        .with_encoding(Compression::ZIP16, BlockDescription::ScanLines, LineOrder::Increasing)
+        .with_attributes(attributes(plan, merged, values))
+        .with_shared_attributes(shared);
+    let mut lines = Lines { channels, width, samples: Vec::new() };
+    let written = ::exr::block::write(to, smallvec![header], true, |meta, writer| {
+        let mut compressor = writer.sequential_blocks_compressor(&meta);
+        let mut compress = |first: usize, data: Vec<u8>| {
+            let lines = LINES.min(height - first);
+            let (pixel_position, pixel_size) = (Vec2(0, first), Vec2(width, lines));
+            let index = BlockIndex { layer: 0, pixel_position, pixel_size, level: Vec2(0, 0) };
+            compressor.compress_block(first / LINES, UncompressedBlock { index, data })
+        };
+        let mut first = 0;
+        values.each(|i, bin| {
+            lines.take(bin);
+            let end = (i + 1) / width;
+            if (i + 1) % width == 0 && (end % LINES == 0 || end == height) {
+                compress(first, lines.bytes()).map_err(failed)?;
+                first = end;
+            }
+            Ok(())
+        })?;
+        Ok(())
+    });
+    written.map_err(failed)
+}
+
+fn failed(error: ::exr::error::Error) -> std::io::Error {
+    std::io::Error::other(error.to_string())
+}
+
+/// Some lines of all channels, as they come: bin by bin.
+struct Lines {
+    channels: [Channel; CHANNELS.len()],
+    width: usize,
+    /// All channels of a bin, and so on.
+    samples: Vec<f32>,
+}
+
+impl Lines {
+    fn take(&mut self, bin: &Bin) {
+        self.samples.extend(self.channels.iter().map(|(_, number)| number(bin) as f32));
+    }
+
+    /// The bytes of the lines so far, as a file has them: in each line channel after channel.
+    fn bytes(&mut self) -> Vec<u8> {
+        let count = self.channels.len();
+        let mut bytes = Vec::with_capacity(4 * self.samples.len());
+        for line in self.samples.chunks_exact(self.width * count) {
+            for channel in 0..count {
+                line[channel..].iter().step_by(count).for_each(|x| bytes.extend(x.to_ne_bytes()));
+            }
+        }
+        self.samples.clear();
+        bytes
+    }
 }
 
 fn attributes(plan: &Plan, merged: &Merged, values: &SetValues) -> LayerAttributes {

@@ -4,13 +4,14 @@
 
 use super::number::short;
 use super::summary::SetSummary;
-use super::values::{Bin, SetValues};
+use super::values::SetValues;
 use crate::farm::plan::Plan;
 use crate::job::Estimator;
 use crate::tally::health::checks::{CHECKS, Outcome, Snapshot};
 use crate::tally::health::{Examined, Health, Mark};
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::io;
 
 /// Monitored receivers beyond this number are left to `summary.json`.
 const MOST_LINES: usize = 12;
@@ -37,14 +38,20 @@ pub(super) struct Monitored {
 
 impl Monitored {
     /// The monitored receivers of one set, those that do not exist left out.
-    pub fn all(values: &SetValues) -> impl Iterator<Item = Monitored> + '_ {
-        let existing = |e: &&Examined| values.bins[e.bin as usize].health.is_some();
-        values.monitored.iter().filter(existing).map(|e| Monitored::new(values, e))
+    ///
+    /// # Errors
+    /// Those of reading their bins.
+    pub fn all(values: &SetValues) -> io::Result<Vec<Monitored>> {
+        let mut all = Vec::new();
+        for examined in &values.monitored {
+            let health = values.bin(examined.bin as usize)?.health;
+            all.extend(health.map(|health| Monitored::new(values, examined, health)));
+        }
+        Ok(all)
     }
 
-    fn new(values: &SetValues, examined: &Examined) -> Self {
+    fn new(values: &SetValues, examined: &Examined, health: Health) -> Self {
         let (shape, bin) = (&values.shape, examined.bin);
-        let health = values.bins[bin as usize].health.unwrap_or_default();
         Monitored {
             set: shape.name.clone(),
             column: bin % shape.width,
@@ -73,15 +80,26 @@ impl Monitored {
     }
 }
 
-/// Of `bins` how many have each mark, by its word with underscores.
-pub(super) fn count_marks(bins: &[Bin]) -> BTreeMap<String, usize> {
-    let count = |mark: Mark| bins.iter().filter(|b| b.health.is_some_and(|h| h.has(mark))).count();
-    Mark::ALL.into_iter().map(|mark| (key(mark), count(mark))).collect()
+/// How many bins of a set have marks.
+#[derive(Debug, Default)]
+pub(super) struct Counts {
+    by_mark: [usize; Mark::ALL.len()],
+    /// With any mark.
+    pub unhealthy: usize,
 }
 
-/// How many of `bins` have any mark.
-pub(super) fn count_unhealthy(bins: &[Bin]) -> usize {
-    bins.iter().filter(|b| b.health.is_some_and(|h: Health| !h.is_healthy())).count()
+impl Counts {
+    /// Takes in the next bin, None without a receiver.
+    pub fn add(&mut self, health: Option<Health>) {
+        let Some(health) = health.filter(|h| !h.is_healthy()) else { return };
+        self.unhealthy += 1;
+        self.by_mark.iter_mut().zip(Mark::ALL).for_each(|(n, mark)| *n += usize::from(health.has(mark)));
+    }
+
+    /// The number of each mark, by its word with underscores.
+    pub fn named(&self) -> BTreeMap<String, usize> {
+        Mark::ALL.into_iter().map(key).zip(self.by_mark).collect()
+    }
 }
 
 /// A line for each set with intervals that should not be trusted, the points together, and one for each such

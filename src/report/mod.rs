@@ -35,8 +35,10 @@ mod derived;
 mod derived_text;
 mod exr;
 mod health;
+mod luminaire;
 mod number;
 mod png;
+mod polar;
 mod regions;
 mod scale;
 mod stopping;
@@ -45,9 +47,10 @@ mod text;
 mod values;
 mod views;
 
+pub use luminaire::luminaire_text;
 pub use number::short;
 pub use png::MAP_ORIGIN;
-pub use text::text_summary;
+pub use polar::write_polar;
 pub use views::{View, write_views};
 
 use crate::error::{Error, Result};
@@ -59,16 +62,17 @@ use std::path::Path;
 use summary::Collector;
 use values::SetValues;
 
-/// Writes all results of `plan` into the folder `dir`; `summary.json` last, so that it stands for a whole set.
+/// Writes all results of `plan` into the folder `dir`; `summary.json` last, so that it stands for a whole set. Returns the
+/// summary as a short table for a terminal: a line for each receiver set, the flux balance, the warnings.
 ///
 /// # Errors
 /// [`Error::Io`] naming the file that could not be written.
-pub fn write(plan: &Plan, merged: &Merged, dir: &Path) -> Result<()> {
+pub fn write(plan: &Plan, merged: &Merged, dir: &Path) -> Result<String> {
     std::fs::create_dir_all(dir).map_err(Error::io(dir))?;
     let mut collector = Collector::new(plan, merged);
     let (mut points, mut regions) = (Vec::new(), Vec::new());
     for values in SetValues::all(plan, merged) {
-        collector.add(&values);
+        collector.add(&values).map_err(Error::io(dir))?;
         match values.shape.kind {
             ReceiverKind::Point => points.push(values),
             ReceiverKind::Region => regions.push(values),
@@ -82,7 +86,8 @@ pub fn write(plan: &Plan, merged: &Merged, dir: &Path) -> Result<()> {
         replace(&dir.join("regions.csv"), |to| regions::write(plan, merged, &regions, to))?;
     }
     let summary = collector.finish();
-    replace(&dir.join("summary.json"), |to| summary::write_json(&summary, to))
+    replace(&dir.join("summary.json"), |to| summary::write_json(&summary, to))?;
+    Ok(text::table_of(&summary))
 }
 
 /// The files of one receiver set that is neither point nor region.

@@ -7,10 +7,10 @@ use super::canvas::{Canvas, Font, Rgb};
 use super::missing_text;
 use super::number::{label, short};
 use super::scale::{NOTHING, Scale};
-use super::values::{Bin, SetValues, kind_name};
+use super::values::{SetValues, kind_name};
 use crate::farm::merge::Merged;
 use crate::farm::plan::Plan;
-use crate::job::ReceiverKind;
+use crate::job::{ReceiverKind, SetShape};
 use crate::tally::health::FEW_BATCHES;
 use std::io::{Result, Write};
 
@@ -38,19 +38,63 @@ pub(super) fn write(plan: &Plan, merged: &Merged, values: &SetValues, to: &mut i
         ReceiverKind::Camera | ReceiverKind::Gonio | ReceiverKind::Region => ("luminance", "cd/m²"),
         ReceiverKind::Grid | ReceiverKind::Point => ("illuminance", "lx"),
     };
-    let zoom = Zoom::new(values, cell_shape(plan, values));
-    let value = Panel::new(format!("{quantity} [{unit}]"), unit, values, colorous::INFERNO, |b| b.value);
-    let error = |b: &Bin| 100.0 * b.relative_error;
-    let error = Panel::new("relative standard error [%]".to_owned(), "%", values, colorous::VIRIDIS, error);
+    let zoom = Zoom::new(&values.shape, cell_shape(plan, values));
+    let drawn = Drawn::new(values, &zoom)?;
+    let value = Panel::new(format!("{quantity} [{unit}]"), unit, drawn.values, colorous::INFERNO);
+    let error = Panel::new("relative standard error [%]".to_owned(), "%", drawn.errors, colorous::VIRIDIS);
     let title = format!("{}: {} {}", plan.name, kind_name(values.shape.kind), values.shape.name);
     let picture = Picture {
         title,
         subtitle: subtitle(plan, merged),
         panels: [value, error],
-        remarks: remarks(merged, values, &zoom),
+        remarks: remarks(merged, values, &zoom, drawn.grey),
         zoom,
     };
-    picture.draw(values).write_png(to)
+    picture.draw(&values.shape).write_png(to)
+}
+
+/// The bins that are drawn, however large the map.
+struct Drawn {
+    values: Numbers,
+    /// Relative standard errors \[%\].
+    errors: Numbers,
+    /// True when some bin, drawn or not, has no error.
+    grey: bool,
+}
+
+/// Numbers of one panel.
+struct Numbers {
+    /// Of the bins drawn, row by row.
+    drawn: Vec<f64>,
+    /// Least and largest finite one of all bins.
+    extremes: [f64; 2],
+}
+
+impl Numbers {
+    fn take(&mut self, number: f64, drawn: bool) {
+        if drawn {
+            self.drawn.push(number);
+        }
+        if number.is_finite() {
+            self.extremes = [self.extremes[0].min(number), self.extremes[1].max(number)];
+        }
+    }
+}
+
+impl Drawn {
+    fn new(values: &SetValues, zoom: &Zoom) -> Result<Self> {
+        let none = || Numbers { drawn: Vec::new(), extremes: [f64::NAN; 2] };
+        let mut all = Drawn { values: none(), errors: none(), grey: false };
+        let (width, step) = (values.shape.width as usize, zoom.step as usize);
+        values.each(|i, bin| {
+            let drawn = (i / width).is_multiple_of(step) && (i % width).is_multiple_of(step);
+            all.values.take(bin.value, drawn);
+            all.errors.take(100.0 * bin.relative_error, drawn);
+            all.grey |= bin.relative_error.is_nan();
+            Ok(())
+        })?;
+        Ok(all)
+    }
 }
 
 /// Height over width of a cell as it lies in space; 1 for pixels and directions.
@@ -68,7 +112,7 @@ fn subtitle(plan: &Plan, merged: &Merged) -> String {
 }
 
 /// What a reader must know, one line each.
-fn remarks(merged: &Merged, values: &SetValues, zoom: &Zoom) -> Vec<String> {
+fn remarks(merged: &Merged, values: &SetValues, zoom: &Zoom, grey: bool) -> Vec<String> {
     let [width, height] = [values.shape.width, values.shape.height];
     let mut remarks = vec![match values.shape.kind {
         ReceiverKind::Camera => format!("{width} x {height} pixels, row 0 on top"),
@@ -80,7 +124,7 @@ fn remarks(merged: &Merged, values: &SetValues, zoom: &Zoom) -> Vec<String> {
     if zoom.step > 1 {
         remarks.push(format!("one of {} bins drawn in each direction", zoom.step));
     }
-    if values.bins.iter().any(|b| b.relative_error.is_nan()) {
+    if grey {
         remarks.push("grey: no receiver or no information".to_owned());
     }
     if merged.batches < FEW_BATCHES {
@@ -99,8 +143,8 @@ struct Zoom {
 }
 
 impl Zoom {
-    fn new(values: &SetValues, shape: f64) -> Self {
-        let bins = [values.shape.width, values.shape.height];
+    fn new(set: &SetShape, shape: f64) -> Self {
+        let bins = [set.width, set.height];
         let step = bins[0].max(bins[1]).div_ceil(LARGEST_SIDE);
         let bins = bins.map(|n| n.div_ceil(step));
         let fit = |side: f64, n: u32| (side.round() as u32).clamp(SHORT_SIDE.div_ceil(n), (2 * LONG_SIDE / n).max(1));
@@ -112,8 +156,8 @@ impl Zoom {
     }
 
     /// Pixels of the whole map.
-    fn size(&self, values: &SetValues) -> [u32; 2] {
-        let bins = [values.shape.width, values.shape.height];
+    fn size(&self, set: &SetShape) -> [u32; 2] {
+        let bins = [set.width, set.height];
         std::array::from_fn(|i| bins[i].div_ceil(self.step) * self.cell[i])
     }
 }
@@ -121,7 +165,8 @@ impl Zoom {
 /// One map with its scale bar.
 struct Panel {
     title: String,
-    number: fn(&Bin) -> f64,
+    /// Of the bins drawn.
+    numbers: Vec<f64>,
     scale: Scale,
     labels: Vec<String>,
     words: String,
@@ -129,20 +174,13 @@ struct Panel {
 }
 
 impl Panel {
-    fn new(
-        title: String,
-        unit: &str,
-        values: &SetValues,
-        gradient: colorous::Gradient,
-        number: fn(&Bin) -> f64,
-    ) -> Self {
-        let finite = || values.bins.iter().map(number).filter(|x| x.is_finite());
+    fn new(title: String, unit: &str, numbers: Numbers, gradient: colorous::Gradient) -> Self {
+        let Numbers { drawn: numbers, extremes: [least, most] } = numbers;
         // An error is small or large against nothing; a value may vary little around a large mean.
-        let scale = Scale::fit(finite(), gradient, unit == "%");
+        let scale = Scale::fit(numbers.iter().copied().filter(|x| x.is_finite()), gradient, unit == "%");
         let labels = scale.ticks().into_iter().map(label).collect();
-        let [least, most] = [finite().fold(f64::NAN, f64::min), finite().fold(f64::NAN, f64::max)];
         let extremes = format!("{} .. {} {unit} found", short(least, 4), short(most, 4));
-        Panel { title, number, labels, words: scale.words(unit), extremes, scale }
+        Panel { title, numbers, labels, words: scale.words(unit), extremes, scale }
     }
 
     /// Size of the map, the bar and the words around them.
@@ -154,11 +192,11 @@ impl Panel {
         [width, LINE + map[1].max(BAR_HEIGHT) + 8 + 2 * LINE]
     }
 
-    fn draw(&self, canvas: &mut Canvas, at: [u32; 2], values: &SetValues, zoom: &Zoom) {
+    fn draw(&self, canvas: &mut Canvas, at: [u32; 2], set: &SetShape, zoom: &Zoom) {
         canvas.text(at, &self.title, Font::Small);
-        let map = zoom.size(values);
+        let map = zoom.size(set);
         let top = [at[0], at[1] + LINE];
-        self.draw_map(canvas, top, values, zoom);
+        self.draw_map(canvas, top, set, zoom);
         canvas.frame(top, map, BLACK);
         let height = map[1].max(BAR_HEIGHT);
         self.draw_bar(canvas, [top[0] + map[0] + MARGIN, top[1]], height);
@@ -166,13 +204,12 @@ impl Panel {
         canvas.text([at[0], top[1] + height + 8 + LINE], &self.extremes, Font::Small);
     }
 
-    fn draw_map(&self, canvas: &mut Canvas, at: [u32; 2], values: &SetValues, zoom: &Zoom) {
+    fn draw_map(&self, canvas: &mut Canvas, at: [u32; 2], set: &SetShape, zoom: &Zoom) {
         let [wide, tall] = zoom.cell;
-        let step = zoom.step as usize;
-        let rows = values.bins.chunks(values.shape.width as usize).step_by(step);
+        let rows = self.numbers.chunks(set.width.div_ceil(zoom.step) as usize);
         for (y, row) in (0u32..).zip(rows) {
-            for (x, bin) in (0u32..).zip(row.iter().step_by(step)) {
-                let colour = self.scale.colour((self.number)(bin));
+            for (x, &number) in (0u32..).zip(row) {
+                let colour = self.scale.colour(number);
                 canvas.fill([at[0] + x * wide, at[1] + y * tall], [wide, tall], colour);
             }
         }
@@ -203,8 +240,8 @@ struct Picture {
 }
 
 impl Picture {
-    fn draw(&self, values: &SetValues) -> Canvas {
-        let map = self.zoom.size(values);
+    fn draw(&self, set: &SetShape) -> Canvas {
+        let map = self.zoom.size(set);
         let sizes = [0, 1].map(|i| self.panels[i].size(map));
         let (places, [right, bottom]) = place(sizes);
         let top = bottom + 6;
@@ -215,7 +252,7 @@ impl Picture {
         canvas.text([MAP_ORIGIN[0], MARGIN], &self.title, Font::Title);
         canvas.text([MAP_ORIGIN[0], MARGIN + 22], &self.subtitle, Font::Small);
         for (panel, at) in self.panels.iter().zip(places) {
-            panel.draw(&mut canvas, at, values, &self.zoom);
+            panel.draw(&mut canvas, at, set, &self.zoom);
         }
         for (i, remark) in (0u32..).zip(&self.remarks) {
             canvas.text([MAP_ORIGIN[0], top + i * LINE], remark, Font::Small);
@@ -245,16 +282,15 @@ fn place(sizes: [[u32; 2]; 2]) -> ([[u32; 2]; 2], [u32; 2]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::job::{Kept, SetShape};
+    use crate::job::Kept;
 
     /// Pixels of a cell, of the whole map, and the step between bins drawn.
     fn zoom(width: u32, height: u32, shape: f64) -> ([u32; 2], [u32; 2], u32) {
         let kept = Kept::Moments { colour: false };
         let shape_of_set =
             SetShape { name: "x".into(), kind: ReceiverKind::Grid, width, height, kept, monitored: Vec::new() };
-        let values = SetValues { shape: shape_of_set, bins: Vec::new(), monitored: Vec::new() };
-        let zoom = Zoom::new(&values, shape);
-        (zoom.cell, zoom.size(&values), zoom.step)
+        let zoom = Zoom::new(&shape_of_set, shape);
+        (zoom.cell, zoom.size(&shape_of_set), zoom.step)
     }
 
     #[test]

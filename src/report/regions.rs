@@ -24,12 +24,12 @@ pub(super) fn write(plan: &Plan, merged: &Merged, regions: &[SetValues], to: &mu
     table.write_record(HEADER)?;
     for (values, region) in regions.iter().zip(&plan.job.regions) {
         assert_eq!(values.shape.name, region.name, "regions come in job order");
-        let bin = &values.bins[0];
+        let bin = values.single()?;
         let numbers = [bin.direct, bin.value, bin.standard_error, bin.low, bin.high, bin.vov];
         // Debug prints the shortest text that reads back to the same bits.
         let numbers = numbers.map(|x| format!("{x:?}"));
         let names = [region.name.clone(), region.camera.clone()];
-        table.write_record(names.iter().chain(&numbers).chain([&note(bin, plan, merged)]))?;
+        table.write_record(names.iter().chain(&numbers).chain([&note(&bin, plan, merged)]))?;
     }
     table.flush()
 }

@@ -2,14 +2,14 @@
 //! runs are compared. A number that is not finite is `null`.
 
 use super::derived::{OfRatio, OfSet, health_of_mean, of_set, ratios};
-use super::health::{Monitored, count_marks, count_unhealthy, estimate_label, is_plain, lines};
+use super::health::{Counts, Monitored, estimate_label, is_plain, lines};
 use super::stopping::StoppedBy;
-use super::values::{SetValues, Status, kind_name, unit};
+use super::values::{Bin, SetValues, Status, kind_name, unit};
 use crate::farm::merge::Merged;
 use crate::farm::plan::{Input, Plan};
 use crate::tally::FLUX_BINS;
 use crate::tally::health::{FEW_BATCHES, Health};
-use crate::tally::statistics::{Estimate, figure_of_merit, median, student_quantile};
+use crate::tally::statistics::{Estimate, figure_of_merit, select, student_quantile};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::io::{Result, Write};
@@ -131,20 +131,27 @@ impl<'a> Collector<'a> {
     }
 
     /// Takes in the next receiver set in job order.
-    pub fn add(&mut self, values: &SetValues) {
+    ///
+    /// # Errors
+    /// Those of reading a map that is kept in a file.
+    pub fn add(&mut self, values: &SetValues) -> Result<()> {
         let place = self.sets.len();
-        let health = health_of_mean(self.plan, self.merged, place, values);
-        let derived = of_set(self.plan, self.merged, place, values, health);
+        let health = health_of_mean(self.plan, self.merged, place, values)?;
+        let derived = of_set(self.plan, self.merged, place, values, health)?;
         self.healths.push(health);
-        self.sets.push(SetSummary::new(values, self.merged.seconds, derived));
-        self.monitored.extend(Monitored::all(values));
         let shape = &values.shape;
         self.hasher.update(shape.name.as_bytes());
         self.hasher.update(&shape.width.to_le_bytes()).update(&shape.height.to_le_bytes());
-        for bin in &values.bins {
+        let mut seen = Seen::default();
+        values.each(|_, bin| {
+            seen.add(bin);
             self.hash(&bin.numbers());
-        }
+            Ok(())
+        })?;
+        self.sets.push(SetSummary::new(values, seen, self.merged.seconds, derived)?);
+        self.monitored.extend(Monitored::all(values)?);
         values.monitored.iter().for_each(|examined| self.hash(&examined.numbers()));
+        Ok(())
     }
 
     /// The summary of all.
@@ -195,31 +202,97 @@ impl<'a> Collector<'a> {
     }
 }
 
+/// What is seen of the bins of a set in passing.
+struct Seen {
+    inside: usize,
+    no_information: usize,
+    exact: usize,
+    marks: Counts,
+    values: Mean,
+    min: f64,
+    max: f64,
+    /// Of the squares of the relative errors.
+    squares: Mean,
+    worst: f64,
+}
+
+impl Default for Seen {
+    fn default() -> Self {
+        let (min, max, worst) = (f64::NAN, f64::NAN, f64::NAN);
+        let (marks, values, squares) = (Counts::default(), Mean::default(), Mean::default());
+        Seen { inside: 0, no_information: 0, exact: 0, marks, values, min, max, squares, worst }
+    }
+}
+
+impl Seen {
+    fn add(&mut self, bin: &Bin) {
+        self.inside += usize::from(bin.status == Status::NoReceiver);
+        self.no_information += usize::from(bin.status == Status::NoInformation);
+        self.exact += usize::from(bin.status == Status::Exact);
+        self.marks.add(bin.health);
+        if bin.value.is_finite() {
+            self.values.add(bin.value);
+            (self.min, self.max) = (self.min.min(bin.value), self.max.max(bin.value));
+        }
+        if let Some(error) = error_of(bin) {
+            self.squares.add(error * error);
+            self.worst = self.worst.max(error);
+        }
+    }
+}
+
+/// The relative error of a bin that has a part in the statistics of errors.
+fn error_of(bin: &Bin) -> Option<f64> {
+    Some(bin.relative_error).filter(|x| bin.status == Status::Estimated && x.is_finite())
+}
+
+/// A mean in the making.
+#[derive(Default)]
+struct Mean {
+    count: u64,
+    sum: f64,
+}
+
+impl Mean {
+    fn add(&mut self, x: f64) {
+        self.count += 1;
+        self.sum += x;
+    }
+
+    /// NaN without any number.
+    fn value(&self) -> f64 {
+        self.sum / self.count as f64
+    }
+}
+
 impl SetSummary {
-    fn new(values: &SetValues, seconds: f64, of_set: OfSet) -> Self {
-        let bins = &values.bins;
-        let count = |status| bins.iter().filter(|b| b.status == status).count();
-        let found = || bins.iter().map(|b| b.value).filter(|x| x.is_finite());
-        let errors = || bins.iter().filter(|b| b.status == Status::Estimated).map(|b| b.relative_error);
-        let errors = || errors().filter(|x| x.is_finite());
-        SetSummary {
+    fn new(values: &SetValues, seen: Seen, seconds: f64, of_set: OfSet) -> Result<Self> {
+        let errors = |take: &mut dyn FnMut(f64)| {
+            values.each(|_, bin| {
+                error_of(bin).into_iter().for_each(&mut *take);
+                Ok(())
+            })
+        };
+        let count = seen.squares.count;
+        let median = if count == 0 { f64::NAN } else { select(count / 2, count, errors)? };
+        Ok(SetSummary {
             name: values.shape.name.clone(),
             kind: kind_name(values.shape.kind),
             unit: unit(values.shape.kind),
-            bins: bins.len(),
-            inside: count(Status::NoReceiver),
-            no_information: count(Status::NoInformation),
-            unhealthy: count_unhealthy(bins),
-            marks: count_marks(bins),
-            exact: count(Status::Exact),
-            mean: mean(found()),
-            min: found().fold(f64::NAN, f64::min),
-            max: found().fold(f64::NAN, f64::max),
-            median_relative_error: median(errors()),
-            worst_relative_error: errors().fold(f64::NAN, f64::max),
-            figure_of_merit: figure_of_merit(mean(errors().map(|r| r * r)).sqrt(), seconds),
+            bins: values.shape.bins(),
+            inside: seen.inside,
+            no_information: seen.no_information,
+            unhealthy: seen.marks.unhealthy,
+            marks: seen.marks.named(),
+            exact: seen.exact,
+            mean: seen.values.value(),
+            min: seen.min,
+            max: seen.max,
+            median_relative_error: median,
+            worst_relative_error: seen.worst,
+            figure_of_merit: figure_of_merit(seen.squares.value().sqrt(), seconds),
             of_set,
-        }
+        })
     }
 }
 
@@ -301,10 +374,4 @@ fn warnings(plan: &Plan, merged: &Merged, flux: &Flux, health: Vec<String>) -> V
 pub(super) fn write_json(summary: &Summary, to: &mut impl Write) -> Result<()> {
     serde_json::to_writer_pretty(&mut *to, summary)?;
     writeln!(to)
-}
-
-/// Mean of `values`; NaN without any.
-fn mean(values: impl Iterator<Item = f64>) -> f64 {
-    let (n, sum) = values.fold((0.0, 0.0), |(n, sum), x| (n + 1.0, sum + x));
-    sum / n
 }

@@ -2,24 +2,18 @@
 
 use super::derived_text;
 use super::number::short;
-use super::summary::{Collector, SetSummary, Summary, Term};
-use super::values::SetValues;
-use crate::farm::merge::Merged;
-use crate::farm::plan::Plan;
+use super::summary::{SetSummary, Summary, Term};
 
 /// Points beyond this number are left to `points.csv`.
 const MOST_POINTS: usize = 12;
 
 /// A short table of the results: a line for each receiver set, the flux balance, the warnings.
-pub fn text_summary(plan: &Plan, merged: &Merged) -> String {
-    let mut collector = Collector::new(plan, merged);
-    SetValues::all(plan, merged).for_each(|values| collector.add(&values));
-    let summary = collector.finish();
-    let mut lines = vec![head(&summary)];
+pub(super) fn table_of(summary: &Summary) -> String {
+    let mut lines = vec![head(summary)];
     lines.extend(summary.stopped_by.as_ref().map(|by| by.line(summary.confidence)));
     lines.extend(table(&summary.sets));
-    lines.extend(derived_text::lines(&summary));
-    lines.push(balance(&summary));
+    lines.extend(derived_text::lines(summary));
+    lines.push(balance(summary));
     lines.extend(summary.warnings.iter().map(|w| format!("warning: {w}")));
     lines.join("\n") + "\n"
 }

@@ -4,12 +4,14 @@
 //! number of batches is applied, and every bin gets its [`Status`]. Goals are judged by the same estimates
 //! ([`Estimate::with_fixed`]).
 
-use crate::farm::merge::{Merged, SetResult};
+use crate::farm::checkpoint::BLOCK;
+use crate::farm::merge::{Blocks, Merged, SetResult};
 use crate::farm::plan::Plan;
 use crate::job::{ReceiverKind, SetShape};
 use crate::tally::Monitor;
 use crate::tally::health::{Common, Counted, Examined, Health, Signs, health};
 use crate::tally::statistics::student_quantile;
+use std::io;
 
 /// What is known of a bin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -82,19 +84,25 @@ impl Bin {
     }
 }
 
-/// The numbers of one receiver set.
-pub(super) struct SetValues {
+/// The numbers of one receiver set. Those of maps are made block by block each time they are asked for: a map need not fit
+/// into memory.
+pub(super) struct SetValues<'a> {
     /// Name, kind and size.
     pub shape: SetShape,
-    /// Row by row.
-    pub bins: Vec<Bin>,
     /// The monitored bins, in ascending order.
     pub monitored: Vec<Examined>,
+    source: Source<'a>,
 }
 
-impl SetValues {
+/// Where the bins of a set come from.
+enum Source<'a> {
+    Held(Vec<Bin>),
+    Streamed { rule: Rule, batches: u64, blocks: &'a Blocks, fixed_direct: &'a [f64] },
+}
+
+impl<'a> SetValues<'a> {
     /// The numbers of the receiver set `shape` of which `set` is the result and `monitors` are its monitored bins.
-    pub fn new(plan: &Plan, merged: &Merged, shape: &SetShape, set: &SetResult, monitors: &[Monitor]) -> Self {
+    pub fn new(plan: &Plan, merged: &Merged, shape: &SetShape, set: &'a SetResult, monitors: &[Monitor]) -> Self {
         let batches = merged.batches;
         let run = &plan.job.run;
         let (SetResult::Moments { fixed_direct, .. } | SetResult::Replicates { fixed_direct, .. }) = set;
@@ -106,30 +114,78 @@ impl SetValues {
             quantile: student_quantile(run.confidence, batches),
             common: Common { histories, narrowest_lobe: plan.scene.narrowest_lobe },
         };
-        let bins = match set {
-            SetResult::Moments { bins, .. } => {
-                assert_eq!(bins.len(), shape.bins(), "the result of another set");
-                let colour = |i| bins.colour.get(i).copied();
-                let raw = (0..bins.len()).map(|i| (Counted::of_moments(bins, i, batches), colour(i)));
-                rule.apply(raw, fixed_direct, &monitored)
+        assert!(fixed_direct.is_empty() || fixed_direct.len() == shape.bins(), "direct light of another set");
+        let source = match set {
+            SetResult::Moments { bins: blocks, .. } => {
+                assert_eq!(blocks.len(), shape.bins(), "the result of another set");
+                Source::Streamed { rule, batches, blocks, fixed_direct }
             }
             SetResult::Replicates { scores, .. } => {
                 assert!(scores.has_shape(shape.bins(), batches), "the result of another set");
-                let raw = (0..shape.bins()).map(|i| (Counted::of_replicates(scores, i), None));
-                rule.apply(raw, fixed_direct, &monitored)
+                let bin = |i| rule.bin((Counted::of_replicates(scores, i), None), fixed_direct, i, find(&monitored, i));
+                Source::Held((0..shape.bins()).map(bin).collect())
             }
         };
-        SetValues { shape: shape.clone(), bins, monitored }
+        SetValues { shape: shape.clone(), monitored, source }
+    }
+
+    /// Gives every bin with its number to `take`, row by row.
+    ///
+    /// # Errors
+    /// Those of `take`, and of reading a map that is kept in a file.
+    pub fn each(&self, mut take: impl FnMut(usize, &Bin) -> io::Result<()>) -> io::Result<()> {
+        match &self.source {
+            Source::Held(bins) => bins.iter().enumerate().try_for_each(|(i, bin)| take(i, bin)),
+            Source::Streamed { blocks, .. } => (0..blocks.count()).try_for_each(|number| {
+                let bins = self.block(number)?;
+                bins.iter().enumerate().try_for_each(|(i, bin)| take(number * BLOCK + i, bin))
+            }),
+        }
+    }
+
+    /// Bin `i` alone.
+    ///
+    /// # Errors
+    /// Those of reading a map that is kept in a file.
+    pub fn bin(&self, i: usize) -> io::Result<Bin> {
+        match &self.source {
+            Source::Held(bins) => Ok(bins[i]),
+            Source::Streamed { .. } => Ok(self.block(i / BLOCK)?[i % BLOCK]),
+        }
+    }
+
+    /// The only bin of a set that has one.
+    ///
+    /// # Errors
+    /// As [`SetValues::bin`].
+    pub fn single(&self) -> io::Result<Bin> {
+        assert_eq!(self.shape.bins(), 1, "a set of more than one bin");
+        self.bin(0)
+    }
+
+    /// The bins of a block of a map.
+    fn block(&self, number: usize) -> io::Result<Vec<Bin>> {
+        let Source::Streamed { rule, batches, blocks, fixed_direct } = &self.source else {
+            unreachable!("only maps have blocks")
+        };
+        let block = blocks.read(number)?;
+        let bin = |i: usize| {
+            let raw = (Counted::of_moments(&block, i, *batches), block.colour.get(i).copied());
+            let at = number * BLOCK + i;
+            rule.bin(raw, fixed_direct, at, find(&self.monitored, at))
+        };
+        Ok((0..block.len()).map(bin).collect())
     }
 
     /// All receiver sets of `plan`, one at a time.
-    pub fn all<'a>(plan: &'a Plan, merged: &'a Merged) -> impl Iterator<Item = SetValues> + 'a {
+    pub fn all(plan: &'a Plan, merged: &'a Merged) -> impl Iterator<Item = SetValues<'a>> + 'a {
         let shapes = plan.job.sets();
         let lengths = [merged.sets.len(), merged.monitors.len()];
         assert_eq!(lengths, [shapes.len(); 2], "a result for each receiver set");
         let results = merged.sets.iter().zip(&merged.monitors);
-        let values =
-            |(shape, (set, monitors)): (SetShape, (_, &Vec<_>))| SetValues::new(plan, merged, &shape, set, monitors);
+        let values = |(shape, (set, monitors)): (SetShape, (&'a SetResult, &Vec<_>))| {
+            SetValues::new(plan, merged, &shape, set, monitors)
+        };
         shapes.into_iter().zip(results).map(values)
     }
 }
@@ -162,17 +218,12 @@ struct Rule {
     common: Common,
 }
 
-impl Rule {
-    fn apply(&self, raw: impl Iterator<Item = Raw>, fixed_direct: &[f64], monitored: &[Examined]) -> Vec<Bin> {
-        let known = |(i, raw): (usize, Raw)| {
-            let examined = monitored.binary_search_by_key(&i, |e| e.bin as usize).ok().map(|at| &monitored[at]);
-            self.bin(raw, fixed_direct, i, examined)
-        };
-        let bins: Vec<Bin> = raw.enumerate().map(known).collect();
-        assert!(fixed_direct.is_empty() || fixed_direct.len() == bins.len(), "direct light of another set");
-        bins
-    }
+/// What is known of bin `i` if it is monitored.
+fn find(monitored: &[Examined], i: usize) -> Option<&Examined> {
+    monitored.binary_search_by_key(&i, |e| e.bin as usize).ok().map(|at| &monitored[at])
+}
 
+impl Rule {
     fn bin(&self, (counted, colour): Raw, fixed_direct: &[f64], i: usize, examined: Option<&Examined>) -> Bin {
         let Some(estimate) = counted.estimate.with_fixed(fixed_direct, i) else {
             return Bin::unknown(Status::NoReceiver);

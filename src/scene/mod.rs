@@ -5,15 +5,20 @@
 //! source in proportion to flux. A scene does not know receivers, seeds or files.
 
 pub mod gltf;
+mod luminaires;
 mod nodes;
+mod panel;
+pub mod photometric_web;
 mod reflectance;
 mod replace;
 mod source;
 
 pub use nodes::{Node, Nodes};
+pub use panel::{Extended, Panel};
 pub use reflectance::{LawInLanes, Reflectance, Scattered, weight_over_tolerated, weights_over_tolerated};
 pub use source::{Emission, Emitter, Light, Sources};
 
+use self::photometric_web::Luminaire;
 use crate::error::{Error, Result};
 use crate::geometry::{Build, Geometry, Harmonic, Hit, Mesh, Plane, Sphere};
 use crate::job::{self, Channels, Job};
@@ -66,8 +71,10 @@ pub struct Model {
     pub surfaces: Vec<Surface>,
     /// The nodes at which the triangles hang.
     pub nodes: Nodes,
-    /// Point, spot and directional lights.
+    /// Lights without extent.
     pub lights: Vec<Light>,
+    /// Luminaires with extent, whose faces are the last of the triangles, in this order.
+    pub extended: Vec<Extended>,
     /// Cameras.
     pub cameras: Vec<CameraNode>,
     /// Star-shaped objects in the place of meshes.
@@ -142,11 +149,12 @@ impl Scene {
         nodes.of_replacements = (surface_of.len() as u32, model.replacements.iter().map(|r| r.node).collect());
         surface_of.extend(model.replacements.iter().map(|r| r.surface));
         let emitters = emitters(&geometry, &surfaces, &surface_of);
-        let lights = model.lights.into_iter().chain(job.sources.iter().map(light));
+        let lights = model.lights.into_iter().chain(job.sources.iter().map(Light::of_job));
         let lights: Vec<Light> = lights.map(|l| l.moved(offset).recoloured(paint)).collect();
         refuse_endless_flux(&geometry, &lights)?;
         let given = lights.len();
-        let sources = Sources::new(lights, emitters, geometry.bounding_sphere());
+        let panels = panels(&geometry, model.triangles.len(), model.extended, |l| l.moved(offset).recoloured(paint));
+        let sources = Sources::new(lights, emitters, panels, geometry.bounding_sphere());
         let mut warnings = model.warnings;
         if sources.lights.len() < given {
             let dark = given - sources.lights.len();
@@ -194,6 +202,14 @@ impl Scene {
     /// The surface of a primitive.
     pub fn surface(&self, primitive: u32) -> &Surface {
         &self.surfaces[self.surface_of[primitive as usize] as usize]
+    }
+
+    /// Luminance that a surface emits where `hit`, towards the unit vector `w` \[cd/m2\]; of its lit side.
+    pub fn emitted(&self, hit: &Hit, w: DVec3) -> Colour {
+        match self.sources.panel_face(hit.primitive) {
+            Some((panel, _)) => panel.luminance(w),
+            None => self.surface(hit.primitive).emission,
+        }
     }
 
     /// Number of primitives: triangles, spheres, planes.
@@ -283,31 +299,30 @@ fn planes(job: &Job, offset: DVec3) -> Vec<Plane> {
     job.planes.iter().map(|p| Plane::new(DVec3::from(p.point) + offset, p.normal.into())).collect()
 }
 
-fn light(source: &job::Source) -> Light {
-    match *source {
-        job::Source::Omni { position, intensity } => {
-            Light::Omni { position: position.into(), intensity: Colour::grey(intensity) }
-        }
-    }
-}
-
 /// The area lights: one for each triangle of an emissive surface.
 fn emitters(geometry: &Geometry, surfaces: &[Surface], surface_of: &[u32]) -> Vec<Emitter> {
     let lit = |primitive: &usize| !surfaces[surface_of[*primitive] as usize].emission.is_black();
     let emitter = |primitive: usize| {
         let surface = &surfaces[surface_of[primitive] as usize];
-        let [a, b, c] = geometry.triangle(primitive as u32);
-        let across = (b - a).cross(c - a);
-        Emitter {
-            primitive: primitive as u32,
-            corners: [a, b, c],
-            normal: across.normalize_or_zero(),
-            area: 0.5 * across.length(),
-            luminance: surface.emission,
-            double_sided: surface.double_sided,
-        }
+        Emitter::of_triangle(geometry, primitive as u32, surface.emission, surface.double_sided)
     };
     (0..surface_of.len()).filter(lit).map(emitter).collect()
+}
+
+/// The luminaires with extent, whose faces are the last of the `triangles`, each `adapted` to the scene.
+fn panels(
+    geometry: &Geometry,
+    triangles: usize,
+    all: Vec<Extended>,
+    adapted: impl Fn(Luminaire) -> Luminaire,
+) -> Vec<Panel> {
+    let mut first = triangles - all.iter().map(|extended| extended.faces.len()).sum::<usize>();
+    let panel = |extended: Extended| {
+        let (from, count) = (first as u32, extended.faces.len());
+        first += count;
+        Panel::new(Extended { luminaire: adapted(extended.luminaire), ..extended }, geometry, from)
+    };
+    all.into_iter().map(panel).collect()
 }
 
 fn refuse_endless_flux(geometry: &Geometry, lights: &[Light]) -> Result<()> {

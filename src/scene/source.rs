@@ -3,8 +3,10 @@
 //! A history chooses its source in proportion to luminous flux and leaves it with the exact distribution of its
 //! emission, so every history starts with the same luminous weight: the flux of all sources together.
 
+use super::panel::Panel;
+use super::photometric_web::Luminaire;
 use crate::geometry::Geometry;
-use crate::math::{DVec3, PI, cbrt, cos, to_world};
+use crate::math::{DVec3, PI, cbrt, cos, pow, to_world};
 use crate::photometry::Colour;
 use crate::random::{Generator, around_z, cosine_hemisphere, disc, sphere};
 
@@ -31,6 +33,19 @@ pub enum Light {
         /// Half angle outside which it is zero \[rad\].
         outer: f64,
     },
+    /// Intensity times a power of the cosine to the axis, in the hemisphere around it.
+    CosPower {
+        /// Position \[m\].
+        position: DVec3,
+        /// Unit vector along the axis.
+        direction: DVec3,
+        /// Luminous intensity on the axis \[cd\].
+        intensity: Colour,
+        /// The power.
+        exponent: f64,
+    },
+    /// The photometric web of a file.
+    Luminaire(Luminaire),
     /// Parallel light.
     Directional {
         /// Unit vector of propagation.
@@ -48,16 +63,23 @@ impl Light {
             Light::Spot { position, direction, intensity, inner, outer } => {
                 Light::Spot { position: position + offset, direction, intensity, inner, outer }
             }
+            Light::CosPower { position, direction, intensity, exponent } => {
+                Light::CosPower { position: position + offset, direction, intensity, exponent }
+            }
+            Light::Luminaire(luminaire) => Light::Luminaire(luminaire.moved(offset)),
             directional @ Light::Directional { .. } => directional,
         }
     }
 
     /// The same light with its colour through `f`.
     pub(super) fn recoloured(mut self, f: impl Fn(Colour) -> Colour) -> Self {
-        let (Light::Omni { intensity: colour, .. }
-        | Light::Spot { intensity: colour, .. }
-        | Light::Directional { illuminance: colour, .. }) = &mut self;
-        *colour = f(*colour);
+        match &mut self {
+            Light::Omni { intensity: colour, .. }
+            | Light::Spot { intensity: colour, .. }
+            | Light::CosPower { intensity: colour, .. }
+            | Light::Directional { illuminance: colour, .. } => *colour = f(*colour),
+            Light::Luminaire(luminaire) => *luminaire = luminaire.clone().recoloured(f),
+        }
         self
     }
 
@@ -66,6 +88,8 @@ impl Light {
         match self {
             Light::Omni { intensity, .. } => *intensity * (4.0 * PI),
             Light::Spot { intensity, inner, outer, .. } => *intensity * Falloff::new(*inner, *outer).solid_angle(),
+            Light::CosPower { intensity, exponent, .. } => *intensity * (2.0 * PI / (exponent + 1.0)),
+            Light::Luminaire(luminaire) => luminaire.flux(),
             Light::Directional { illuminance, .. } => *illuminance * (PI * radius * radius),
         }
     }
@@ -77,13 +101,18 @@ impl Light {
             let way = point - position;
             (Some(position), way.normalize(), intensity / way.length_squared())
         };
-        match *self {
-            Light::Omni { position, intensity } => from(position, intensity),
+        match self {
+            Light::Omni { position, intensity } => from(*position, *intensity),
             Light::Spot { position, direction, intensity, inner, outer } => {
-                let cosine = direction.dot((point - position).normalize());
-                from(position, intensity * Falloff::new(inner, outer).at(cosine))
+                let cosine = direction.dot((point - *position).normalize());
+                from(*position, *intensity * Falloff::new(*inner, *outer).at(cosine))
             }
-            Light::Directional { direction, illuminance } => (None, direction, illuminance),
+            Light::CosPower { position, direction, intensity, exponent } => {
+                let cosine = direction.dot((point - *position).normalize());
+                from(*position, *intensity * if cosine > 0.0 { pow(cosine, *exponent) } else { 0.0 })
+            }
+            Light::Luminaire(luminaire) => from(luminaire.position, luminaire.intensity(point - luminaire.position)),
+            Light::Directional { direction, illuminance } => (None, *direction, *illuminance),
         }
     }
 }
@@ -152,6 +181,14 @@ pub struct Emitter {
 }
 
 impl Emitter {
+    /// The triangle `primitive` of `geometry`.
+    pub(super) fn of_triangle(geometry: &Geometry, primitive: u32, luminance: Colour, double_sided: bool) -> Self {
+        let [a, b, c] = geometry.triangle(primitive);
+        let across = (b - a).cross(c - a);
+        let (normal, area) = (across.normalize_or_zero(), 0.5 * across.length());
+        Emitter { primitive, corners: [a, b, c], normal, area, luminance, double_sided }
+    }
+
     fn flux(&self) -> Colour {
         self.luminance * (PI * self.area * if self.double_sided { 2.0 } else { 1.0 })
     }
@@ -188,28 +225,34 @@ pub struct Sources {
     pub lights: Vec<Light>,
     /// Emissive triangles, in the order of their primitives.
     pub emitters: Vec<Emitter>,
+    /// Luminaires with extent, in the order of their primitives.
+    pub panels: Vec<Panel>,
     /// Running sum of luminous flux over the lights \[lm\].
     light_flux: Vec<f64>,
     /// The same over the emitters, from zero: beside a lamp of 10^12 lm a panel of 1 lm keeps its digits.
     emitter_flux: Vec<f64>,
+    /// The same over the panels.
+    panel_flux: Vec<f64>,
     /// Centre and radius of the sphere that parallel light must cover \[m\].
     covered: (DVec3, f64),
 }
 
 impl Sources {
-    /// Joins `lights` and `emitters` over a scene bounded by `covered`; sources without flux are left out.
-    pub fn new(lights: Vec<Light>, emitters: Vec<Emitter>, covered: (DVec3, f64)) -> Self {
+    /// Joins `lights`, `emitters` and `panels` over a scene bounded by `covered`; sources without flux are left out.
+    pub fn new(lights: Vec<Light>, emitters: Vec<Emitter>, panels: Vec<Panel>, covered: (DVec3, f64)) -> Self {
         let lit = |flux: Colour| flux.luminance() > 0.0;
         let lights: Vec<Light> = lights.into_iter().filter(|l| lit(l.flux(covered.1))).collect();
         let emitters: Vec<Emitter> = emitters.into_iter().filter(|e| lit(e.flux())).collect();
         let light_flux = running_sum(lights.iter().map(|l| l.flux(covered.1)));
         let emitter_flux = running_sum(emitters.iter().map(Emitter::flux));
-        Sources { lights, emitters, light_flux, emitter_flux, covered }
+        let panels: Vec<Panel> = panels.into_iter().filter(|p| lit(p.luminaire.flux())).collect();
+        let panel_flux = running_sum(panels.iter().map(|p| p.luminaire.flux()));
+        Sources { lights, emitters, panels, light_flux, emitter_flux, panel_flux, covered }
     }
 
     /// Number of sources.
     pub fn len(&self) -> usize {
-        self.lights.len() + self.emitters.len()
+        self.lights.len() + self.emitters.len() + self.panels.len()
     }
 
     /// True in the dark.
@@ -219,7 +262,36 @@ impl Sources {
 
     /// Luminous flux of all sources \[lm\].
     pub fn flux(&self) -> f64 {
-        last(&self.light_flux) + last(&self.emitter_flux)
+        last(&self.light_flux) + last(&self.emitter_flux) + last(&self.panel_flux)
+    }
+
+    /// Chooses a face of a panel by `u` in [0, 1), the panel in proportion to flux and the face to area: the two, and their
+    /// probability.
+    pub fn choose_face(&self, u: f64) -> (&Panel, &Emitter, f64) {
+        let all = last(&self.panel_flux);
+        let number = choose(&self.panel_flux, u * all);
+        let panel = &self.panels[number];
+        let own = panel.luminaire.flux().luminance();
+        let mut left = ((u * all - (self.panel_flux[number] - own)) / own).clamp(0.0, 1.0) * panel.area;
+        let reached = |face: &&Emitter| {
+            left -= face.area;
+            left < 0.0
+        };
+        let face = panel.faces.iter().find(reached).unwrap_or(&panel.faces[panel.faces.len() - 1]);
+        (panel, face, self.face_probability(panel, face))
+    }
+
+    /// The panel of which the triangle `primitive` is a face, and the face.
+    pub fn panel_face(&self, primitive: u32) -> Option<(&Panel, &Emitter)> {
+        let number = self.panels.partition_point(|panel| panel.faces[0].primitive <= primitive).checked_sub(1)?;
+        let panel = &self.panels[number];
+        let face = panel.faces.get((primitive - panel.faces[0].primitive) as usize)?;
+        Some((panel, face))
+    }
+
+    /// Probability with which [`Sources::choose_face`] chooses `face` of `panel`.
+    pub fn face_probability(&self, panel: &Panel, face: &Emitter) -> f64 {
+        panel.luminaire.flux().luminance() / last(&self.panel_flux) * face.area / panel.area
     }
 
     /// Chooses an emitter in proportion to flux by `u` in [0, 1): the emitter and its probability.
@@ -251,10 +323,16 @@ impl Sources {
     pub fn emit(&self, geometry: &Geometry, rng: &mut Generator) -> Emission {
         let target = if self.len() == 1 { 0.0 } else { rng.uniform() * self.flux() };
         let of_lights = last(&self.light_flux);
-        let (origin, direction, flux) = if target < of_lights || self.emitters.is_empty() {
+        let of_surfaces = of_lights + last(&self.emitter_flux);
+        let none_but_lights = self.emitters.is_empty() && self.panels.is_empty();
+        let (origin, direction, flux) = if target < of_lights || none_but_lights {
             self.emit_light(&self.lights[choose(&self.light_flux, target)], rng)
-        } else {
+        } else if target < of_surfaces || self.panels.is_empty() {
             emit_triangle(&self.emitters[choose(&self.emitter_flux, target - of_lights)], geometry, rng)
+        } else {
+            let panel = &self.panels[choose(&self.panel_flux, target - of_surfaces)];
+            let (origin, direction) = panel.emit(geometry, rng);
+            (origin, direction, panel.luminaire.flux())
         };
         // flux over the probability of the choice: the colour of the source, the luminous flux of all.
         Emission { origin, direction, weight: flux * (self.flux() / flux.luminance()) }
@@ -269,6 +347,11 @@ impl Sources {
                 let cosine = Falloff::new(*inner, *outer).sample(u.x);
                 (*position, to_world(*direction, around_z(cosine, u.y)))
             }
+            Light::CosPower { position, direction, exponent, .. } => {
+                let cosine = pow(1.0 - u.x, 1.0 / (exponent + 1.0));
+                (*position, to_world(*direction, around_z(cosine, u.y)))
+            }
+            Light::Luminaire(luminaire) => (luminaire.position, luminaire.sample(u)),
             Light::Directional { direction, .. } => {
                 let across = disc(u) * radius;
                 let start = DVec3::new(across.x, across.y, -2.0 * radius);

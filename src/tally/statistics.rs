@@ -86,6 +86,48 @@ pub fn figure_of_merit(relative_error: f64, seconds: f64) -> f64 {
     1.0 / (relative_error * relative_error * seconds)
 }
 
+/// Numbers up to which [`select`] keeps them all.
+const FEW: u64 = 1 << 16;
+/// Bits of a number that [`select`] decides at a time.
+const DIGIT: u32 = 16;
+
+/// The number with `rank`, from 0, in ascending order among the `count` numbers that `pass` gives, the same ones every time.
+/// Memory does not grow with them: of many, each pass decides sixteen bits.
+///
+/// # Errors
+/// Those of `pass`.
+pub fn select<E>(rank: u64, count: u64, mut pass: impl FnMut(&mut dyn FnMut(f64)) -> Result<(), E>) -> Result<f64, E> {
+    assert!(rank < count, "rank {rank} of {count} numbers");
+    if count <= FEW {
+        let mut all = Vec::with_capacity(count as usize);
+        pass(&mut |x| all.push(x))?;
+        return Ok(*all.select_nth_unstable_by(rank as usize, f64::total_cmp).1);
+    }
+    let (mut rank, mut known) = (rank, 0u64);
+    for shift in (0..u64::BITS).step_by(DIGIT as usize).rev() {
+        let mut counts = vec![0u64; 1 << DIGIT];
+        pass(&mut |x| {
+            let key = key(x);
+            if key.checked_shr(shift + DIGIT).unwrap_or(0) == known {
+                counts[(key >> shift) as usize & ((1 << DIGIT) - 1)] += 1;
+            }
+        })?;
+        let mut digit = 0;
+        while rank >= counts[digit] {
+            rank -= counts[digit];
+            digit += 1;
+        }
+        known = known << DIGIT | digit as u64;
+    }
+    Ok(f64::from_bits(if known >> 63 == 1 { known & !(1 << 63) } else { !known }))
+}
+
+/// An integer in the order of `f64::total_cmp`.
+fn key(x: f64) -> u64 {
+    let bits = x.to_bits();
+    if bits >> 63 == 1 { !bits } else { bits | 1 << 63 }
+}
+
 /// Median of the finite values; NaN without any.
 pub fn median(values: impl Iterator<Item = f64>) -> f64 {
     let mut finite: Vec<f64> = values.filter(|x| x.is_finite()).collect();

@@ -11,7 +11,7 @@ use crate::geometry::{Hit, Ray};
 use crate::math::DVec3;
 use crate::photometry::Colour;
 use crate::random::Generator;
-use crate::scene::{Emitter, Scene};
+use crate::scene::{Emitter, Panel, Scene};
 
 /// From this distance in lengths of its longest edge on, a triangle is sampled by area: the geometric factor then
 /// varies less than threefold over it, and the solid angle of a tiny triangle need not be computed.
@@ -66,7 +66,35 @@ pub fn from_emitters(scene: &Scene, receiver: &Receiver, samples: u64, rng: &mut
             sum += sample_emitter(scene, receiver, &sight, rng);
         }
         if receiver.response.is_peaked() {
-            sum += sample_response(scene, receiver, lifted, rng);
+            let seen = |primitive: u32| {
+                let (emitter, probability) = scene.sources.emitter(primitive)?;
+                Sight::new(emitter, probability, lifted)
+            };
+            sum += sample_response(scene, receiver, lifted, rng, seen);
+        }
+    }
+    sum / samples as f64
+}
+
+/// The same of luminaires with extent.
+pub fn from_panels(scene: &Scene, receiver: &Receiver, samples: u64, rng: &mut Generator) -> Colour {
+    if scene.sources.panels.is_empty() {
+        return Colour::BLACK;
+    }
+    let lifted = scene.geometry.lift(receiver.position, receiver.normal);
+    let mut sum = Colour::BLACK;
+    for k in 0..samples {
+        let stratum = (k as f64 + rng.uniform()) / samples as f64;
+        let (panel, face, probability) = scene.sources.choose_face(stratum);
+        if let Some(sight) = Sight::new(face, probability, lifted) {
+            sum += sample_emitter(scene, receiver, &sight.of(panel), rng);
+        }
+        if receiver.response.is_peaked() {
+            let seen = |primitive: u32| {
+                let (panel, face) = scene.sources.panel_face(primitive)?;
+                Some(Sight::new(face, scene.sources.face_probability(panel, face), lifted)?.of(panel))
+            };
+            sum += sample_response(scene, receiver, lifted, rng, seen);
         }
     }
     sum / samples as f64
@@ -102,22 +130,24 @@ fn sample_emitter(scene: &Scene, receiver: &Receiver, sight: &Sight, rng: &mut G
         return Colour::BLACK;
     }
     let both = sight.density(point) + density_of_response(scene, receiver, w_in);
-    sight.emitter.luminance * (cosine / both) * receiver.response.to(scene, receiver.normal, w_in)
+    sight.luminance(w_in) * (cosine / both) * receiver.response.to(scene, receiver.normal, w_in)
 }
 
 /// One sample of the light that emitters send where the peaked response looks.
-fn sample_response(scene: &Scene, receiver: &Receiver, from: DVec3, rng: &mut Generator) -> Colour {
+fn sample_response<'a>(
+    scene: &Scene,
+    receiver: &Receiver,
+    from: DVec3,
+    rng: &mut Generator,
+    seen: impl Fn(u32) -> Option<Sight<'a>>,
+) -> Colour {
     let Some((direction, weight)) = receiver.response.sample(scene, receiver.normal, rng) else {
         return Colour::BLACK;
     };
     let hit = scene.geometry.closest_hit(&Ray { origin: from, direction });
-    let emitter = |hit: Hit| {
-        let (emitter, probability) = scene.sources.emitter(hit.primitive)?;
-        Some((hit, Sight::new(emitter, probability, from)?))
-    };
-    let Some((hit, sight)) = hit.and_then(emitter) else { return Colour::BLACK };
+    let Some((hit, sight)) = hit.and_then(|hit: Hit| Some((hit, seen(hit.primitive)?))) else { return Colour::BLACK };
     let density = density_of_response(scene, receiver, -direction);
-    sight.emitter.luminance * weight * (density / (density + sight.density(hit.position)))
+    sight.luminance(-direction) * weight * (density / (density + sight.density(hit.position)))
 }
 
 /// Density of directions drawn from the response, 0 where it is not peaked and none are drawn \[1/sr\].
@@ -129,6 +159,8 @@ fn density_of_response(scene: &Scene, receiver: &Receiver, w_in: DVec3) -> f64 {
 /// An emitter seen from a point on its lit side.
 struct Sight<'a> {
     emitter: &'a Emitter,
+    /// The luminaire of which it is a face, if it is one.
+    panel: Option<&'a Panel>,
     /// Probability of its choice.
     probability: f64,
     from: DVec3,
@@ -148,13 +180,27 @@ impl<'a> Sight<'a> {
         }
         let far = ((a + b + c) / 3.0 - from).length_squared() > FAR * FAR * emitter.longest_edge_squared();
         let triangle = (!far).then(|| SphericalTriangle::new(&emitter.corners, from));
-        Some(Sight { emitter, probability, from, normal: emitter.normal * side.signum(), triangle })
+        Some(Sight { emitter, panel: None, probability, from, normal: emitter.normal * side.signum(), triangle })
     }
 
-    /// A point of the emitter.
+    /// The same as a face of `panel`.
+    fn of(self, panel: &'a Panel) -> Self {
+        Sight { panel: Some(panel), ..self }
+    }
+
+    /// Luminance of light with the propagation direction `w_in` \[cd/m2\].
+    fn luminance(&self, w_in: DVec3) -> Colour {
+        self.panel.map_or(self.emitter.luminance, |panel| panel.luminance(w_in))
+    }
+
+    /// A point of the emitter. The luminance of a luminaire grows without bound where it is seen edge-on and still shines: by area
+    /// that is bounded, by solid angle contact is, so half of the points are drawn in each of the two ways.
     fn sample(&self, rng: &mut Generator) -> Option<DVec3> {
+        let by_area = self.triangle.is_none() || (self.panel.is_some() && rng.uniform() < 0.5);
         let random = rng.uniform2();
-        let Some(triangle) = &self.triangle else { return Some(self.emitter.point(random)) };
+        let Some(triangle) = self.triangle.as_ref().filter(|_| !by_area) else {
+            return Some(self.emitter.point(random));
+        };
         let direction = triangle.sample(random);
         let distance = self.normal.dot(self.emitter.corners[0] - self.from) / self.normal.dot(direction);
         (distance > 0.0 && distance.is_finite()).then(|| self.from + distance * direction)
@@ -162,14 +208,16 @@ impl<'a> Sight<'a> {
 
     /// Density in solid angle with which `point` is drawn, the choice of the emitter included \[1/sr\].
     fn density(&self, point: DVec3) -> f64 {
-        let solid_angle = match &self.triangle {
-            Some(triangle) => triangle.solid_angle,
-            None => {
-                let way = self.from - point;
-                let d2 = way.length_squared();
-                self.emitter.area * self.normal.dot(way) / (d2 * d2.sqrt())
-            }
+        // What the area would be as a solid angle, were all of it where the point is.
+        let by_area = || {
+            let way = self.from - point;
+            let d2 = way.length_squared();
+            self.emitter.area * self.normal.dot(way) / (d2 * d2.sqrt())
         };
-        self.probability / solid_angle
+        match (&self.triangle, self.panel) {
+            (Some(triangle), None) => self.probability / triangle.solid_angle,
+            (Some(triangle), Some(_)) => 0.5 * self.probability * (1.0 / triangle.solid_angle + 1.0 / by_area()),
+            (None, _) => self.probability / by_area(),
+        }
     }
 }

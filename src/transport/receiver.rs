@@ -164,7 +164,7 @@ pub fn look_at(scene: &Scene, mut hit: Hit, mut direction: DVec3, rng: &mut Gene
             break;
         }
         let surface = scene.surface(hit.primitive);
-        seen.emitted += attenuation * surface.emission;
+        seen.emitted += attenuation * scene.emitted(&hit, -direction);
         let cosine = -direction.dot(hit.normal);
         let mirror = surface.reflectance.delta_reflectance(cosine);
         let follow = mirror.map_or(0.0, |f| follow_probability(&surface.reflectance, f, cosine));

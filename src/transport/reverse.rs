@@ -53,7 +53,7 @@ pub fn path(scene: &Scene, transport: &Transport, receiver: &Receiver, rng: &mut
         let surface = scene.surface(hit.primitive);
         let back = -ray.direction;
         let response = |w_in| surface.reflectance.evaluate(hit.normal, w_in, back);
-        *(if met == 1 { &mut found.direct } else { &mut found.reflected }) += weight * surface.emission;
+        *(if met == 1 { &mut found.direct } else { &mut found.reflected }) += weight * scene.emitted(&hit, back);
         found.reflected += weight * from_lights(scene, hit.position, hit.normal, response);
         if surface.reflectance.is_peaked_at(back.dot(hit.normal)) {
             let matt = |w_in: DVec3| surface.reflectance.albedo(-w_in.dot(hit.normal)) / PI;

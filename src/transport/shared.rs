@@ -10,7 +10,7 @@
 //! ([`super::direct`]). Who takes part depends on places alone, so both are unbiased.
 
 use super::connection::{Connectors, Link, LitPoint, Rule, Tile, connect};
-use super::direct::{from_emitters, from_some_emitters};
+use super::direct::{from_emitters, from_panels, from_some_emitters};
 use super::receiver::Receiver;
 use crate::geometry::Ray;
 use crate::geometry::visibility::{BUNDLE, BUNDLES, Lanes, Points, Scratch};
@@ -18,6 +18,7 @@ use crate::math::{DVec2, DVec3, Vec3};
 use crate::photometry::Colour;
 use crate::random::Generator;
 use crate::random::sobol::PointSet;
+use crate::scene::photometric_web::Luminaire;
 use crate::scene::{Emitter, Light, Scene};
 use std::ops::Range;
 
@@ -86,6 +87,9 @@ pub fn direct_light(
 ) -> Vec<Colour> {
     let places: Vec<Receiver> = receivers.iter().map(|(r, _)| *r).collect();
     let mut light = if lights { of_lights(scene, &places) } else { vec![Colour::BLACK; places.len()] };
+    for ((receiver, rng), light) in receivers.iter_mut().zip(&mut light) {
+        *light += from_panels(scene, receiver, samples, rng);
+    }
     if scene.sources.emitters.is_empty() {
         return light;
     }
@@ -136,7 +140,10 @@ fn of_lights(scene: &Scene, receivers: &[Receiver]) -> Vec<Colour> {
         }
         match light {
             Light::Directional { direction, .. } => shadow_of_parallel(scene, *direction, receivers, &mut seen),
-            Light::Omni { position, .. } | Light::Spot { position, .. } => {
+            Light::Omni { position, .. }
+            | Light::Spot { position, .. }
+            | Light::CosPower { position, .. }
+            | Light::Luminaire(Luminaire { position, .. }) => {
                 scene.geometry.hide(position.as_vec3(), &points, &mut seen, &mut Scratch::default());
             }
         }

@@ -127,6 +127,33 @@ fn a_dry_run_shows_scripts_and_commands_for_what_is_missing_and_writes_nothing()
 }
 
 #[test]
+fn of_a_compacted_folder_only_what_is_missing_behind_it_is_submitted_and_computed() {
+    let place = Place::new();
+    let dir = place.planned("dir");
+    (0..3).for_each(|shard| drop(expect(0, &mut work(&dir, shard))));
+    expect(0, lampyris(&["compact"]).arg(&dir));
+    assert!(!dir.join(checkpoint(0)).exists());
+    let said = expect(0, submit(&dir).arg("--dry-run"));
+    assert!(said.contains("\nsbatch --array=3-5 "), "{said}");
+    // A task that was queued before finds its shard complete.
+    expect(0, &mut work(&dir, 1));
+    assert!(!dir.join(checkpoint(1)).exists());
+    let seen = expect(0, lampyris(&["status", "--json"]).arg(&dir));
+    let seen: serde_json::Value = serde_json::from_str(&seen).unwrap();
+    assert_eq!((&seen["shards_done"], &seen["attempts"]), (&3.into(), &3.into()), "{seen}");
+    assert_eq!(seen["shards"][0]["host"], seen["hosts"][0]["host"], "{seen}");
+    (3..6).for_each(|shard| drop(expect(0, &mut work(&dir, shard))));
+    let said = expect(0, submit(&dir).arg("--dry-run"));
+    assert!(said.starts_with("nothing to submit: every shard is complete"), "{said}");
+    expect(0, lampyris(&["merge"]).arg(&dir));
+    Bits::of(&dir).assert_same(&straight().bits);
+    // Longer, whole again, and what is missing is new.
+    expect(0, lampyris(&["extend", "--batches", "33"]).arg(&dir));
+    let said = expect(0, submit(&dir).arg("--dry-run"));
+    assert!(said.contains("\nsbatch --array=5-6 "), "{said}");
+}
+
+#[test]
 fn wrong_submissions_are_named() {
     let place = Place::new();
     let dir = place.planned("dir");

@@ -5,11 +5,15 @@
 //! when it is proved to have hit a worker at work, and a test goes on, with fresh folders where needed, until it has
 //! enough of them.
 
+mod auditing;
 mod bits;
 mod changes;
+mod compacting;
 #[cfg(all(target_arch = "x86_64", target_env = "gnu"))]
 mod cpu;
+mod disk;
 mod engines;
+mod extending;
 mod faults;
 mod kills;
 mod merging;

@@ -2,7 +2,7 @@
 
 use crate::place::{Place, Tree, batches_of, checkpoint, computed, header, plan_in, straight};
 use crate::process::{expect, lampyris, run_quietly, work};
-use lampyris::farm::checkpoint::{Reader, Snapshot, VERSION, write};
+use lampyris::farm::checkpoint::{Reader, Run, Snapshot, VERSION, write};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -120,10 +120,13 @@ fn write_diverging(from: &Path, to: &Path, batch: usize) {
         shard: SHARD,
         tally: &tally,
         fixed_direct: &fixed,
-        seconds: 1.0,
+        runs: &[Run {
+            batches: tally.batches(),
+            host: "elsewhere".into(),
+            instructions: "scalar".into(),
+            seconds: 1.0,
+        }],
         written: 0,
-        host: "elsewhere",
-        instructions: "scalar",
         relative_error: 0.1,
     };
     fs::create_dir_all(to.join("shards")).unwrap();

@@ -81,3 +81,15 @@ fn two_workers_on_one_shard_do_no_harm() {
     assert_eq!(stray.wait().unwrap().code(), Some(0));
     assert_shards(&dir, 0..SHARDS);
 }
+
+#[test]
+fn two_runs_of_one_job_in_one_folder_at_once_do_no_harm() {
+    let place = Place::new();
+    let (job, dir) = (place.path("job.toml"), place.path("dir"));
+    let mut pair = [start(&mut run_quietly(&job, &dir, 2)), start(&mut run_quietly(&job, &dir, 2))];
+    for run in &mut pair {
+        assert_eq!(run.wait().unwrap().code(), Some(0));
+    }
+    assert_shards(&dir, 0..SHARDS);
+    Bits::of(&dir).assert_same(&straight().bits);
+}

@@ -1,14 +1,17 @@
 //! Spherical harmonics and the surfaces made of them: numbers of the reference table, identities, the paper's own
 //! formulas, and first hits against an oracle that finds all roots.
 
+mod lines;
+mod normals;
 mod objects;
 mod oracle;
 mod paper;
 mod shells;
 
-use lampyris::geometry::harmonic::{Series, Star, basis, projection};
+use lampyris::geometry::harmonic::{Bounds, Series, Star, basis, projection};
 use lampyris::math::{DVec3, PI, sin_cos};
 use lampyris::random::{Domain, Generator, Stream, sphere};
+use lines::Verdict;
 use std::collections::BTreeMap;
 
 /// The reference table: kind, parameters, quantity, value.
@@ -169,7 +172,7 @@ fn gradients_are_finite_differences_of_values_at_the_poles_too() {
 #[test]
 fn nothing_exceeds_the_bounds_of_the_coefficients() {
     let series = objects::rough(24, &mut generator("bounds"));
-    let (bounds, radii) = (series.bounds(), Star::new(series.clone()).unwrap().radii());
+    let (bounds, radii) = (Bounds::of_coefficients(&series), Star::new(series.clone()).unwrap().radii());
     assert!(radii.0 > bounds.low && radii.1 < bounds.high, "{radii:?} {bounds:?}");
     let mut rng = generator("bounds of");
     let (mut least, mut most) = (f64::INFINITY, 0f64);
@@ -192,48 +195,21 @@ fn a_projection_gives_back_its_series() {
     }
 }
 
-/// Lines of all kinds: from outside, from inside, from the surface both ways, past the object.
-fn lines(star: &Star, rng: &mut Generator) -> (DVec3, DVec3) {
-    let (low, high) = star.radii();
-    let target = sphere(rng.uniform2()) * high * rng.uniform();
-    let from = match (4.0 * rng.uniform()) as u32 {
-        0 => sphere(rng.uniform2()) * high * (1.0 + 3.0 * rng.uniform()),
-        1 => sphere(rng.uniform2()) * low * rng.uniform(),
-        kind => {
-            let n0 = sphere(rng.uniform2());
-            let (normal, _) = star.normal_and_area(n0);
-            let lift = if kind == 2 { 1e-6 } else { -1e-6 };
-            star.series().value(n0) * n0 + lift * normal
-        }
-    };
-    (from, (target - from).normalize())
-}
-
 /// First hits of `count` lines against the oracle: no wrong one, no missed one but where nobody can tell. How many grazed.
 fn compare(name: &str, star: &Star, count: usize) -> usize {
     let mut rng = generator(name);
-    let mut grazing = 0;
-    for _ in 0..count {
-        let (o, d) = lines(star, &mut rng);
-        let all = oracle::crossings(star.series(), o, d);
-        let first = star.first_crossing(o, d, f64::INFINITY);
-        let agrees = match (&first, all.distances.first()) {
-            (None, None) => true,
-            (Some(c), Some(&expected)) => {
-                let at = o + c.distance * d;
-                // Both are as good as their values over the cosine, at a tangency as good as the root of that; the oracle, which
-                // knows angles about the foot of the centre, less good where that is near.
-                let within = 1e-11 / d.dot(c.normal).abs().max(1e-6);
-                assert!((c.position - at).length() < within, "{name}: {} {at}", c.position);
-                assert!((c.normal - star.normal_and_area(at.normalize()).0).length() < 100.0 * within);
-                (c.distance - expected).abs() < within
+    let graze = |_| {
+        let (o, d) = lines::draw(star, &mut rng);
+        match lines::judge(star, o, d) {
+            Verdict::Agrees { leaves } => {
+                assert!(!leaves, "{name}: nothing in the way from {o} along {d}");
+                false
             }
-            _ => false,
-        };
-        grazing += usize::from(!agrees && all.grazes);
-        assert!(agrees || all.grazes, "{name}: {first:?} {:?} from {o} along {d}", all.distances);
-    }
-    grazing
+            Verdict::Grazes => true,
+            Verdict::Wrong(why) => panic!("{name}: {why} from {o} along {d}"),
+        }
+    };
+    (0..count).map(graze).filter(|&grazes| grazes).count()
 }
 
 #[test]
@@ -247,7 +223,7 @@ fn first_hits_are_those_of_the_oracle() {
     ];
     for (name, series) in objects {
         let grazing = compare(name, &Star::new(series).unwrap(), 3000);
-        assert!(grazing <= 1, "{name}: {grazing} of 3000 lines graze");
+        assert!(grazing <= 2, "{name}: {grazing} of 3000 lines graze");
     }
 }
 

@@ -12,6 +12,15 @@ pub struct Crossings {
     pub distances: Vec<f64>,
     /// True where an extremum lies so near zero that nobody can tell.
     pub grazes: bool,
+    /// How far the line passes the centre.
+    pub foot: f64,
+}
+
+impl Crossings {
+    /// How well a crossing so far from the centre is known: p/cos a of an angle that is off by a few roundings.
+    pub fn resolution(&self, from_center: f64) -> f64 {
+        1e-15 * from_center * from_center / self.foot
+    }
 }
 
 /// Half widths below which an interval is given up.
@@ -26,7 +35,7 @@ pub fn crossings(series: &Series, o: DVec3, d: DVec3) -> Crossings {
     let p = foot.length();
     assert!(p > 1e-9, "a line through the centre");
     let wave = Wave::new(series, foot / p, d, p);
-    let mut found = Crossings { distances: Vec::new(), grazes: false };
+    let mut found = Crossings { distances: Vec::new(), grazes: false, foot: p };
     let start = atan2(-along, p);
     wave.roots(start, 0.5 * PI, &mut found);
     found.distances.iter_mut().for_each(|a| *a = along + p * tan(*a));

@@ -91,7 +91,7 @@ fn grids_have_intervals_for_every_point_together() {
     // Intervals of every point need no batches, moments will do.
     let job = JOB.replace("rows = 2\n", "rows = 2\nkeep_batches = false\n");
     let mut result = merged(20);
-    result.sets[2] = SetResult::Moments { bins: moments(6, 20, false), fixed_direct: Vec::new() };
+    result.sets[2] = SetResult::Moments { bins: moments(6, 20, false).into(), fixed_direct: Vec::new() };
     let dir = written(&plan(&job), &result);
     let mut reader = csv::Reader::from_path(dir.path().join("desk.csv")).unwrap();
     let row = reader.records().next().unwrap().unwrap();
@@ -142,7 +142,7 @@ fn ratios_have_a_value_and_an_interval_or_say_why_not() {
 #[test]
 fn the_terminal_shows_a_line_for_each_grid_region_and_ratio() {
     let (plan, result) = with_regions(20);
-    let text = report::text_summary(&plan, &result);
+    let text = super::text(&plan, &result);
     for line in [
         "  derived, intervals at 95 %:",
         "    desk: mean 5.800 +- 0.48 lx, min 3.000 (2.344 .. 3.656) lx, Uo 0.5172 (",
@@ -165,7 +165,7 @@ fn what_is_derived_has_the_marks_of_what_it_is_derived_from() {
     for quantity in [&desk["mean"], &desk["min"], &desk["uniformity"], &s["sets"][4]["interval"], &s["ratios"][0]] {
         assert_eq!(quantity["marks"][0], "few batches", "{quantity}");
     }
-    assert!(report::text_summary(&plan, &result).contains(" cd/m2 [marked: few batches"));
+    assert!(text(&plan, &result).contains(" cd/m2 [marked: few batches"));
     // Half of the mean of the desk may come by a caustic: its interval is marked, and the ratio over it.
     let (mut plan, mut result) = with_regions(20);
     plan.scene.narrowest_lobe = 0.0;
@@ -190,6 +190,6 @@ fn nothing_known_is_null_and_no_crash() {
             assert!(desk[part]["ci_lower"].is_null(), "{part} of {n} batches: {desk}");
             assert_eq!(desk[part]["note"], "an interval needs two batches");
         }
-        assert!(report::text_summary(&plan, &result).contains("(no interval: an interval needs two batches)"));
+        assert!(text(&plan, &result).contains("(no interval: an interval needs two batches)"));
     }
 }

@@ -11,7 +11,7 @@ fn suspicious() -> Merged {
     bins.m2[0] = 0.05 * (64 * 63) as f64;
     (bins.mean[0], bins.peak[0], bins.peak[1], bins.peak[2]) = (1.0, 100.0, 100.0, 0.0);
     let fixed_direct = vec![0.0, 0.0, 0.0, f64::NAN, 0.0, 0.0];
-    result.sets[0] = SetResult::Moments { bins, fixed_direct };
+    result.sets[0] = SetResult::Moments { bins: bins.into(), fixed_direct };
     result
 }
 
@@ -40,7 +40,7 @@ fn caustic_light_is_marked_where_it_could_spoil_the_interval() {
         let mut bins = moments(6, 64, false);
         // Standard errors are 0.1: a tenth of the half-width is 0.02.
         (bins.caustic[0], bins.caustic[1]) = (0.019, 0.021);
-        result.sets[0] = SetResult::Moments { bins, fixed_direct: Vec::new() };
+        result.sets[0] = SetResult::Moments { bins: bins.into(), fixed_direct: Vec::new() };
         let dir = written(&plan, &result);
         summary(dir.path())["sets"][0]["marks"]["caustic"].as_u64().unwrap()
     };
@@ -61,7 +61,7 @@ fn marks_are_counted_and_said_in_a_line() {
     }
     let line = "view: 3 of 5 intervals should not be trusted (1 no information, 1 relative error, 2 peak)";
     assert!(warnings(dir.path()).iter().any(|w| w == line), "{:?}", warnings(dir.path()));
-    assert!(report::text_summary(&plan(JOB), &suspicious()).contains(&format!("warning: {line}")));
+    assert!(text(&plan(JOB), &suspicious()).contains(&format!("warning: {line}")));
     assert!(!warnings(dir.path()).iter().any(|w| w.starts_with("eye:")), "all is well there");
 }
 

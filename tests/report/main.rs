@@ -127,8 +127,8 @@ fn merged(n: u64) -> Merged {
     let fixed = vec![10.0, f64::NAN, 0.0, 0.0, 0.0, 0.0];
     Merged {
         sets: vec![
-            SetResult::Moments { bins: moments(6, n, false), fixed_direct: Vec::new() },
-            SetResult::Moments { bins: moments(8, n, false), fixed_direct: Vec::new() },
+            SetResult::Moments { bins: moments(6, n, false).into(), fixed_direct: Vec::new() },
+            SetResult::Moments { bins: moments(8, n, false).into(), fixed_direct: Vec::new() },
             SetResult::Replicates { scores: replicates(6, n), fixed_direct: fixed },
             SetResult::Replicates { scores: replicates(1, n), fixed_direct: Vec::new() },
         ],
@@ -148,6 +148,12 @@ fn written(plan: &Plan, merged: &Merged) -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
     report::write(plan, merged, dir.path()).unwrap();
     dir
+}
+
+/// The summary as a terminal shows it.
+fn text(plan: &Plan, merged: &Merged) -> String {
+    let dir = tempfile::tempdir().unwrap();
+    report::write(plan, merged, dir.path()).unwrap()
 }
 
 fn close(a: impl Into<f64>, b: f64) -> bool {

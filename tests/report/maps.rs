@@ -97,8 +97,8 @@ fn exr_colours_are_the_means_of_r_g_b() {
     let mut result = merged(20);
     let mut bins = moments(6, 20, true);
     bins.colour[4] = [3.0, 2.0, 1.0];
-    result.sets[0] = SetResult::Moments { bins, fixed_direct: vec![0.5; 6] };
-    result.sets[1] = SetResult::Moments { bins: moments(8, 20, true), fixed_direct: Vec::new() };
+    result.sets[0] = SetResult::Moments { bins: bins.into(), fixed_direct: vec![0.5; 6] };
+    result.sets[1] = SetResult::Moments { bins: moments(8, 20, true).into(), fixed_direct: Vec::new() };
     let dir = written(&plan(&job), &result);
     let image = read_exr(&dir.path().join("view.exr"));
     assert_eq!(["R", "G", "B"].map(|c| channel(&image, c)[4]), [3.5, 2.5, 1.5]);
@@ -129,7 +129,7 @@ fn exr_tells_no_information_from_exact_and_from_no_receiver() {
     }
     (bins.mean[1], bins.direct[1], bins.existed[1]) = (4.0, 4.0, 0);
     let fixed_direct = vec![0.0, 0.0, f64::NAN, 0.0, 0.0, 0.0];
-    result.sets[0] = SetResult::Moments { bins, fixed_direct };
+    result.sets[0] = SetResult::Moments { bins: bins.into(), fixed_direct };
     let dir = written(&plan(JOB), &result);
     let image = read_exr(&dir.path().join("view.exr"));
     let get = |name: &str| channel(&image, name);

@@ -55,7 +55,7 @@ fn grid_notes_say_no_information_and_incomplete() {
 fn grid_kept_as_moments_has_no_variance_of_variance() {
     let job = JOB.replace("rows = 2\n", "rows = 2\nkeep_batches = false\n");
     let mut result = merged(20);
-    result.sets[2] = SetResult::Moments { bins: moments(6, 20, false), fixed_direct: vec![1.0; 6] };
+    result.sets[2] = SetResult::Moments { bins: moments(6, 20, false).into(), fixed_direct: vec![1.0; 6] };
     let dir = written(&plan(&job), &result);
     let (_, rows) = rows(&dir.path().join("desk.csv"));
     assert_eq!([&rows[0][9], &rows[0][10], &rows[0][16], &rows[0][17]], ["1.25", "2.0", "NaN", ""]);

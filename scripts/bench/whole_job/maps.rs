@@ -1,16 +1,20 @@
 //! A job of one map of 1 megapixel with made-up scores: what checkpoints and merging cost does not depend on how the
 //! numbers came about.
 
-use lampyris::farm::checkpoint::Snapshot;
+use lampyris::farm::checkpoint::{Run, Snapshot};
 use lampyris::farm::plan::{Input, Plan, SceneSummary};
 use lampyris::job::Job;
 use lampyris::random::{Domain, Stream};
 use lampyris::tally::{BatchScores, Scores, Tally};
+use std::sync::LazyLock;
 
 /// Edge of the map \[pixels\].
 pub const SIDE: usize = 1024;
 /// Of the one map: none.
 static NO_FIXED_DIRECT: [Vec<f64>; 1] = [Vec::new()];
+static RUNS: LazyLock<[Run; 1]> = LazyLock::new(|| {
+    [Run { batches: OF_SHARD, host: "bench".to_owned(), instructions: "scalar".to_owned(), seconds: 60.0 }]
+});
 /// Batches in each shard.
 pub const OF_SHARD: u64 = 4;
 
@@ -56,17 +60,5 @@ pub fn tally(plan: &Plan, shard: u64) -> Tally {
 
 /// What is written of `tally` as `shard`.
 pub fn snapshot<'a>(plan: &'a Plan, shard: u64, tally: &'a Tally) -> Snapshot<'a> {
-    let (seconds, written, relative_error) = (60.0, 0, 0.1);
-    let instructions = "scalar";
-    Snapshot {
-        plan,
-        shard,
-        tally,
-        fixed_direct: &NO_FIXED_DIRECT,
-        seconds,
-        written,
-        host: "bench",
-        instructions,
-        relative_error,
-    }
+    Snapshot { plan, shard, tally, fixed_direct: &NO_FIXED_DIRECT, runs: &*RUNS, written: 0, relative_error: 0.1 }
 }

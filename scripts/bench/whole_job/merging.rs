@@ -69,7 +69,8 @@ fn in_a_process(root: &Path) -> [f64; 3] {
 
 /// Merges the folder `root` and prints seconds, CPU seconds and peak memory.
 pub fn here(root: &Path) {
-    let (seconds, (cpu, merged)) = timed(|| cpu_timed(|| merge(&[Folder::new(root)]).expect("the shards are whole")));
+    let (seconds, (cpu, merged)) =
+        timed(|| cpu_timed(|| merge(&[Folder::new(root)], root).expect("the shards are whole")));
     println!("{seconds} {cpu} {}", peak_memory());
     drop(merged);
 }
@@ -96,8 +97,8 @@ fn copy_to_nowhere(root: &Path) {
 fn results() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     fill(folder.path(), 2);
-    let (plan, merged) = merge(&[Folder::new(folder.path())]).expect("the shards are whole");
+    let (plan, merged) = merge(&[Folder::new(folder.path())], folder.path()).expect("the shards are whole");
     let out = folder.path().join("results");
-    let write = || lampyris::report::write(&plan, &merged, &out).expect("the disk has room");
+    let write = || drop(lampyris::report::write(&plan, &merged, &out).expect("the disk has room"));
     println!("files of results (EXR of 11 channels, PNG, summary): {} ms", median_of(RUNS, write));
 }

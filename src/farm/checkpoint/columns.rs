@@ -1,43 +1,72 @@
-//! Sections of numbers in postcard's form, a whole column at a time.
+//! Sections of numbers, a whole column at a time.
 //!
-//! A list of f64 is its length as a varint and eight little-endian bytes for each entry. Postcard's own serializer goes
-//! through them byte by byte; these functions give and take the same bytes (a test compares them) at the speed of
-//! memory, which is what merging and writing large maps need. They know columns, not what stands in them.
+//! Moments are columns of eight bytes a number, packed. Batch scores stand in postcard's form: a list of f64 is its length
+//! as a varint and eight little-endian bytes for each entry. Postcard's own serializer goes through them byte by byte; these
+//! functions give and take the same bytes (a test compares them) at the speed of memory, which is what merging and
+//! writing large sets need. They know columns, not what stands in them.
 
+use super::packed::{pack, unpack};
 use crate::tally::{MomentBlock, Replicates};
 use std::ops::Range;
 
-/// The bins `range` of `bins`, as postcard would write a block of them.
-pub(super) fn encode_moments(bins: &MomentBlock, range: Range<usize>) -> Vec<u8> {
+/// The bins `range` of `bins`: the columns end to end, eight little-endian bytes for each number.
+pub fn to_bytes(bins: &MomentBlock, range: Range<usize>) -> Vec<u8> {
     let MomentBlock { mean, m2, direct, peak, caustic, existed, colour } = bins;
-    let mut to = Vec::with_capacity(range.len() * (5 * 8 + 2 + if colour.is_empty() { 0 } else { 3 * 8 }) + 64);
+    let mut to = Vec::with_capacity(bytes_of(range.len(), !colour.is_empty()));
     for column in [mean, m2, direct, peak, caustic] {
-        put_numbers(&mut to, range.len(), &column[range.clone()]);
+        put_numbers(&mut to, &column[range.clone()]);
     }
-    put_counts(&mut to, &existed[range.clone()]);
-    let colour = if colour.is_empty() { &[][..] } else { &colour[range] };
-    put_numbers(&mut to, colour.len(), colour.as_flattened());
+    existed[range.clone()].iter().for_each(|count| to.extend(count.to_le_bytes()));
+    for channel in 0..if colour.is_empty() { 0 } else { 3 } {
+        colour[range.clone()].iter().for_each(|c| to.extend(c[channel].to_le_bytes()));
+    }
     to
 }
 
-/// The block in `bytes`; None where they are anything else.
-pub(super) fn decode_moments(bytes: &[u8]) -> Option<MomentBlock> {
-    let mut from = Columns(bytes);
-    let [mean, m2, direct, peak, caustic] =
-        [from.numbers()?, from.numbers()?, from.numbers()?, from.numbers()?, from.numbers()?];
-    let (existed, colour) = (from.counts()?, from.triples()?);
-    from.end(MomentBlock { mean, m2, direct, peak, caustic, existed, colour })
+/// The block of `bins` bins in `bytes`; None where they are anything else.
+pub fn from_bytes(bytes: &[u8], bins: usize, colour: bool) -> Option<MomentBlock> {
+    if bytes.len() != bytes_of(bins, colour) {
+        return None;
+    }
+    let mut columns = bytes.chunks_exact((8 * bins).max(1));
+    let mut words = || columns.next().unwrap_or_default().as_chunks().0.iter();
+    let mut numbers = || words().map(|word| f64::from_le_bytes(*word)).collect::<Vec<f64>>();
+    let [mean, m2, direct, peak, caustic] = std::array::from_fn(|_| numbers());
+    let existed = words().map(|word| u64::from_le_bytes(*word)).collect();
+    let mut block = MomentBlock { mean, m2, direct, peak, caustic, existed, colour: Vec::new() };
+    block.colour.resize(if colour { bins } else { 0 }, [0.0; 3]);
+    for channel in 0..if colour { 3 } else { 0 } {
+        block.colour.iter_mut().zip(words()).for_each(|(c, word)| c[channel] = f64::from_le_bytes(*word));
+    }
+    Some(block)
+}
+
+/// Bytes of a block of `bins` bins.
+fn bytes_of(bins: usize, colour: bool) -> usize {
+    8 * bins * if colour { 9 } else { 6 }
+}
+
+/// The bins `range` of `bins`, packed.
+pub fn encode_moments(bins: &MomentBlock, range: Range<usize>) -> Vec<u8> {
+    pack(&to_bytes(bins, range.clone()), range.len())
+}
+
+/// The block of `bins` bins in `bytes`; None where they are anything else.
+pub(super) fn decode_moments(bytes: &[u8], bins: usize, colour: bool) -> Option<MomentBlock> {
+    from_bytes(&unpack(bytes, bins, bytes_of(bins, colour))?, bins, colour)
 }
 
 /// `scores`, as postcard would write them.
-pub(super) fn encode_replicates(scores: &Replicates) -> Vec<u8> {
+pub fn encode_replicates(scores: &Replicates) -> Vec<u8> {
     let Replicates { bins, value, direct, peak, caustic, existed } = scores;
     let mut to = Vec::with_capacity(8 * (value.len() + direct.len()) + (2 * 8 + 2) * peak.len() + 64);
     put_count(&mut to, *bins);
     for column in [value, direct, peak, caustic] {
-        put_numbers(&mut to, column.len(), column);
+        put_count(&mut to, column.len() as u64);
+        put_numbers(&mut to, column);
     }
-    put_counts(&mut to, existed);
+    put_count(&mut to, existed.len() as u64);
+    existed.iter().for_each(|&count| put_count(&mut to, count));
     to
 }
 
@@ -50,17 +79,10 @@ pub(super) fn decode_replicates(bytes: &[u8]) -> Option<Replicates> {
     from.end(Replicates { bins, value, direct, peak, caustic, existed })
 }
 
-/// A list of `entries` entries, their numbers one after the other.
-fn put_numbers(to: &mut Vec<u8>, entries: usize, numbers: &[f64]) {
-    put_count(to, entries as u64);
+fn put_numbers(to: &mut Vec<u8>, numbers: &[f64]) {
     let start = to.len();
     to.resize(start + 8 * numbers.len(), 0);
     to[start..].as_chunks_mut().0.iter_mut().zip(numbers).for_each(|(bytes, x)| *bytes = x.to_le_bytes());
-}
-
-fn put_counts(to: &mut Vec<u8>, counts: &[u64]) {
-    put_count(to, counts.len() as u64);
-    counts.iter().for_each(|&count| put_count(to, count));
 }
 
 /// A varint: seven bits a byte, the lowest first, the highest bit set where more follow.
@@ -91,22 +113,11 @@ impl Columns<'_> {
         }
     }
 
-    /// The bytes of a list whose entries have `size` bytes each.
-    fn entries(&mut self, size: usize) -> Option<&[u8]> {
-        let length = usize::try_from(self.count()?).ok()?.checked_mul(size)?;
-        let (entries, rest) = self.0.split_at_checked(length)?;
-        self.0 = rest;
-        Some(entries)
-    }
-
     fn numbers(&mut self) -> Option<Vec<f64>> {
-        let (numbers, _) = self.entries(8)?.as_chunks();
-        Some(numbers.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect())
-    }
-
-    fn triples(&mut self) -> Option<Vec<[f64; 3]>> {
-        let (triples, _) = self.entries(24)?.as_chunks::<8>().0.as_chunks();
-        Some(triples.iter().map(|triple| triple.map(f64::from_le_bytes)).collect())
+        let length = usize::try_from(self.count()?).ok()?.checked_mul(8)?;
+        let (numbers, rest) = self.0.split_at_checked(length)?;
+        self.0 = rest;
+        Some(numbers.as_chunks().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect())
     }
 
     fn counts(&mut self) -> Option<Vec<u64>> {
@@ -147,17 +158,30 @@ mod tests {
         postcard::to_stdvec(x).unwrap()
     }
 
+    fn replicates(bins: usize) -> Replicates {
+        let MomentBlock { mean, m2, peak, caustic, existed, .. } = block(bins, false);
+        Replicates { bins: bins as u64, value: mean, direct: m2, peak, caustic, existed }
+    }
+
     #[test]
-    fn the_bytes_are_those_of_postcard() {
-        for (bins, colour) in [(0, false), (1, true), (127, false), (128, true), (300, true)] {
+    fn moments_come_back_bit_for_bit() {
+        for (bins, colour) in [(0, false), (1, true), (127, false), (4096, true)] {
             let block = block(bins, colour);
             let encoded = encode_moments(&block, 0..bins);
-            assert_eq!(encoded, bytes(&block), "{bins}");
-            assert_eq!(bytes(&decode_moments(&encoded).unwrap()), encoded, "{bins}");
+            assert_eq!(bytes(&decode_moments(&encoded, bins, colour).unwrap()), bytes(&block), "{bins}");
             let part = bins / 3..bins;
-            assert_eq!(encode_moments(&block, part.clone()), bytes(&block.slice(part)), "{bins}");
-            let MomentBlock { mean, m2, peak, caustic, existed, .. } = block;
-            let scores = Replicates { bins: bins as u64, value: mean, direct: m2, peak, caustic, existed };
+            let decoded = decode_moments(&encode_moments(&block, part.clone()), part.len(), colour).unwrap();
+            assert_eq!(bytes(&decoded), bytes(&block.slice(part)), "{bins}");
+            // Of another shape.
+            assert!(decode_moments(&encoded, bins + 1, colour).is_none());
+            assert!(bins == 0 || decode_moments(&encoded, bins, !colour).is_none());
+        }
+    }
+
+    #[test]
+    fn the_bytes_of_batch_scores_are_those_of_postcard() {
+        for bins in [0, 1, 127, 128, 300] {
+            let scores = replicates(bins);
             let encoded = encode_replicates(&scores);
             assert_eq!(encoded, bytes(&scores), "{bins}");
             assert_eq!(bytes(&decode_replicates(&encoded).unwrap()), encoded, "{bins}");
@@ -166,12 +190,11 @@ mod tests {
 
     #[test]
     fn cut_lengthened_and_impossible_bytes_are_refused() {
-        let encoded = encode_moments(&block(5, true), 0..5);
-        assert!((0..encoded.len()).all(|length| decode_moments(&encoded[..length]).is_none()));
-        assert!(decode_moments(&[&encoded[..], &[0]].concat()).is_none());
+        let encoded = encode_replicates(&replicates(5));
+        assert!((0..encoded.len()).all(|length| decode_replicates(&encoded[..length]).is_none()));
+        assert!(decode_replicates(&[&encoded[..], &[0]].concat()).is_none());
         // A list longer than memory, and a length that is no number.
         for length in [&[0xff; 9][..], &[0xff; 11]] {
-            assert!(decode_moments(&[length, &[1; 64]].concat()).is_none());
             assert!(decode_replicates(&[&[1], length, &[1; 64]].concat()).is_none());
         }
     }
@@ -179,14 +202,14 @@ mod tests {
     #[test]
     fn whatever_is_decoded_postcard_decodes_alike() {
         // Any byte changed: the two agree about what it means, and about whether it means anything.
-        let encoded = encode_moments(&block(3, true), 0..3);
+        let encoded = encode_replicates(&replicates(3));
         for at in 0..encoded.len() {
             for mask in [1, 0x80, 0xff] {
                 let mut changed = encoded.clone();
                 changed[at] ^= mask;
-                let theirs = postcard::take_from_bytes::<MomentBlock>(&changed).ok();
-                let theirs = theirs.and_then(|(block, rest)| rest.is_empty().then_some(block));
-                assert_eq!(decode_moments(&changed).map(|b| bytes(&b)), theirs.map(|b| bytes(&b)), "{at}");
+                let theirs = postcard::take_from_bytes::<Replicates>(&changed).ok();
+                let theirs = theirs.and_then(|(scores, rest)| rest.is_empty().then_some(scores));
+                assert_eq!(decode_replicates(&changed).map(|s| bytes(&s)), theirs.map(|s| bytes(&s)), "{at}");
             }
         }
     }

@@ -1,4 +1,5 @@
-//! One durable file for each shard: a prefix of its batches. The format is described in docs/checkpoint-format.md.
+//! One durable file for each shard: a prefix of its batches; and one for the first shards of a plan together, each
+//! complete, a compaction. The format is described in docs/checkpoint-format.md.
 //!
 //! ```text
 //! magic (8) | version u32 | header length u32 | header (postcard) | checksum (16) | sections
@@ -12,11 +13,15 @@
 //! decoded before its checksum agrees, and nothing decoded is used before its shape is that of the plan.
 
 mod columns;
+mod header;
+mod packed;
 mod read;
 mod write;
 
-pub use read::{Reader, read_header};
-pub use write::{Snapshot, write};
+pub use columns::{from_bytes, to_bytes};
+pub use header::{Header, Judged, Run, Span};
+pub use read::{Reader, read_compaction, read_header, read_progress};
+pub use write::{Draft, Encode, Snapshot, encode_moments, encode_plain, encode_replicates, write, write_draft};
 
 use crate::job::{Kept, SetShape};
 use serde::{Deserialize, Serialize};
@@ -25,39 +30,16 @@ use std::ops::Range;
 /// First bytes of every checkpoint; the last two find transfers that translate line ends.
 pub const MAGIC: [u8; 8] = *b"LAMPYR\r\n";
 /// Version of the format that this program writes and reads.
-pub const VERSION: u32 = 3;
+pub const VERSION: u32 = 4;
 /// Bins of a map that are stored, checked and merged together.
 pub const BLOCK: usize = 4096;
 /// Magic, version and header length \[bytes\].
 const PREAMBLE: usize = 16;
-/// Longest header \[bytes\]: 2^20 batch digests and 2^16 sections fit with room.
+/// Longest header \[bytes\]: that of a compaction of 10^5 batches and 10^5 shards fits with room.
 const MAX_HEADER: u32 = 1 << 26;
 
 /// The first 16 bytes of a BLAKE3 hash.
 pub type Checksum = [u8; 16];
-
-/// What a checkpoint says about itself.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Header {
-    /// Digest of the plan.
-    pub plan: [u8; 32],
-    /// Number of the shard.
-    pub shard: u64,
-    /// Digest of each batch done, in order: their number is the number of batches.
-    pub digests: Vec<[u8; 16]>,
-    /// Time spent on these batches \[s\].
-    pub seconds: f64,
-    /// When the file was written \[s since 1970\].
-    pub written: u64,
-    /// Machine that wrote it.
-    pub host: String,
-    /// Instructions with which its kernels ran; no number depends on them.
-    pub instructions: String,
-    /// Median relative error so far, an estimate from this shard alone; NaN when nothing is known.
-    pub relative_error: f64,
-    /// What follows the header, in the order of the file.
-    pub sections: Vec<Section>,
-}
 
 /// A run of bytes of one kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -101,13 +83,6 @@ pub enum Content {
     },
 }
 
-impl Header {
-    /// Number of batches done.
-    pub fn batches(&self) -> u64 {
-        self.digests.len() as u64
-    }
-}
-
 /// The sections that a checkpoint of the receiver sets `shapes` has, in the order of the file.
 fn layout(shapes: &[SetShape]) -> Vec<Content> {
     let numbered = || (0u32..).zip(shapes);
@@ -127,7 +102,7 @@ pub fn block_count(shape: &SetShape) -> u32 {
 }
 
 /// The bins of one block.
-fn block_range(shape: &SetShape, block: u32) -> Range<usize> {
+pub fn block_range(shape: &SetShape, block: u32) -> Range<usize> {
     let start = block as usize * BLOCK;
     start..(start + BLOCK).min(shape.bins())
 }

@@ -1,9 +1,11 @@
 //! Checkpoint file -> header, blocks, tally.
 
 use super::columns::{decode_moments, decode_replicates};
-use super::{Checksum, Content, Header, MAGIC, MAX_HEADER, PREAMBLE, Section, VERSION};
-use super::{block_count, block_range, checksum, layout};
+use super::header::longest;
+use super::{Checksum, Content, Header, MAGIC, PREAMBLE, Section, VERSION};
+use super::{block_count, block_range, checksum};
 use crate::error::{Error, Result};
+use crate::farm::folder::Folder;
 use crate::farm::plan::Plan;
 use crate::job::{Kept, SetShape};
 use crate::tally::{FLUX_BINS, MomentBlock, Moments, Monitor, Replicates, SetTally, Tally};
@@ -15,13 +17,10 @@ use std::ops::Range;
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 
-/// Longest name of instructions \[bytes\].
-const LONGEST_NAME: usize = 16;
-
 /// As much as the system reads at one wish \[bytes\].
 const STRIDE: u64 = 1 << 20;
 
-/// An open checkpoint of a known plan and shard, its header checked.
+/// An open checkpoint of a known plan and span, its header checked.
 #[derive(Debug)]
 pub struct Reader {
     path: PathBuf,
@@ -40,6 +39,24 @@ pub fn read_header(path: &Path, plan: &Plan, shard: u64) -> Result<Option<Header
     Ok(Reader::open(path, plan, shard)?.map(|reader| reader.header))
 }
 
+/// The header of the compaction in `folder`; None where there is none.
+///
+/// # Errors
+/// As [`Reader::open`].
+pub fn read_compaction(folder: &Folder, plan: &Plan) -> Result<Option<Header>> {
+    Ok(Reader::open_compaction(&folder.compaction_path(), plan)?.map(|reader| reader.header))
+}
+
+/// How far shard `k` is by the files in `folder`: what its compaction says, of which `folded` are the parts, or else the
+/// header of the shard's own checkpoint; None where it has not begun.
+///
+/// # Errors
+/// As [`Reader::open`].
+pub fn read_progress(folder: &Folder, plan: &Plan, folded: &[Header], k: u64) -> Result<Option<Header>> {
+    let part = usize::try_from(k).ok().and_then(|k| folded.get(k));
+    part.map_or_else(|| read_header(&folder.shard_path(k), plan, k), |part| Ok(Some(part.clone())))
+}
+
 impl Reader {
     /// Opens the checkpoint of `shard` of `plan` at `path`; None without a file.
     ///
@@ -47,14 +64,28 @@ impl Reader {
     /// [`Error::Refused`] for a file that is damaged, of a newer version, or of another plan or shard;
     /// [`Error::Io`].
     pub fn open(path: &Path, plan: &Plan, shard: u64) -> Result<Option<Reader>> {
+        Reader::open_span(path, plan, Some(shard))
+    }
+
+    /// Opens a compaction of `plan` at `path`; None without a file.
+    ///
+    /// # Errors
+    /// As [`Reader::open`].
+    pub fn open_compaction(path: &Path, plan: &Plan) -> Result<Option<Reader>> {
+        Reader::open_span(path, plan, None)
+    }
+
+    /// The file of a shard, or of no single one.
+    fn open_span(path: &Path, plan: &Plan, span: Option<u64>) -> Result<Option<Reader>> {
         let mut file = match File::open(path) {
             Err(e) if e.kind() == ErrorKind::NotFound => return Ok(None),
             other => other.map_err(Error::io(path))?,
         };
         let size = file.metadata().map_err(Error::io(path))?.len();
-        let (header, base) = read_start(&mut file, size).map_err(|fault| fault.at(path))?;
         let shapes = plan.sets();
-        check_header(&header, plan, shard, &shapes).map_err(|reason| Error::refused(path, reason))?;
+        let longest = longest(plan, span, &shapes);
+        let (header, base) = read_start(&mut file, size, longest).map_err(|fault| fault.at(path))?;
+        header.check(plan, span, &shapes).map_err(|reason| Error::refused(path, reason))?;
         check_sections(&header, size - base).map_err(|reason| Error::refused(path, reason))?;
         Ok(Some(Reader { path: path.to_owned(), file, header, base, shapes }))
     }
@@ -73,7 +104,7 @@ impl Reader {
         let colour = shape.kept == Kept::Moments { colour: true };
         let bins = block_range(shape, block).len();
         let content = Content::Moments { set: number(set), block };
-        self.section(content, decode_moments, |b| b.has_shape(bins, colour))
+        self.section(content, |bytes| decode_moments(bytes, bins, colour), |b| b.has_shape(bins, colour))
     }
 
     /// Every batch's score of a set.
@@ -224,7 +255,7 @@ impl Fault {
 }
 
 /// Magic, version, header and checksum of a file of `size` bytes; with the header, where the sections begin.
-fn read_start(file: &mut File, size: u64) -> std::result::Result<(Header, u64), Fault> {
+fn read_start(file: &mut File, size: u64, longest: u64) -> std::result::Result<(Header, u64), Fault> {
     let bad = |reason: &str| Err(Fault::Bad(reason.to_owned()));
     let preamble = read_exactly(file, (PREAMBLE as u64).min(size))?;
     if preamble.len() < PREAMBLE || preamble[..8] != MAGIC {
@@ -237,11 +268,15 @@ fn read_start(file: &mut File, size: u64) -> std::result::Result<(Header, u64), 
         return Err(Fault::Bad(format!("format version {version} is {age}; this program reads version {VERSION}")));
     }
     let base = PREAMBLE as u64 + u64::from(length) + size_of::<Checksum>() as u64;
-    if length > MAX_HEADER || base > size {
+    if base > size {
         return bad("damaged: truncated, or a wrong header length");
     }
-    let mut bytes = preamble;
-    bytes.extend(read_exactly(file, u64::from(length))?);
+    if u64::from(length) > longest {
+        return bad("damaged, or of another plan: its header is longer than any of this plan");
+    }
+    let mut bytes = zeros(PREAMBLE as u64 + u64::from(length))?;
+    bytes[..PREAMBLE].copy_from_slice(&preamble);
+    file.read_exact(&mut bytes[PREAMBLE..])?;
     let sum = read_exactly(file, size_of::<Checksum>() as u64)?;
     if checksum(&bytes)[..] != sum[..] {
         return bad("damaged: wrong checksum of the header");
@@ -250,31 +285,6 @@ fn read_start(file: &mut File, size: u64) -> std::result::Result<(Header, u64), 
         Some(header) => Ok((header, base)),
         None => bad("damaged: the header cannot be decoded"),
     }
-}
-
-fn check_header(header: &Header, plan: &Plan, shard: u64, shapes: &[SetShape]) -> std::result::Result<(), String> {
-    let digest = plan.content_digest();
-    if header.plan != *digest.as_bytes() {
-        let theirs = blake3::Hash::from_bytes(header.plan).to_hex();
-        return Err(format!("of another plan: digest {}, not {}", &theirs[..16], &digest.to_hex()[..16]));
-    }
-    if header.shard != shard {
-        return Err(format!("holds shard {}, not {shard}", header.shard));
-    }
-    if header.batches() > plan.job.run.batches_per_shard {
-        return Err(format!("damaged: {} batches in a shard of {}", header.batches(), plan.job.run.batches_per_shard));
-    }
-    if !header.sections.iter().map(|s| s.content).eq(layout(shapes)) {
-        return Err("damaged: its sections are not those of the plan".to_owned());
-    }
-    if !(header.seconds.is_finite() && header.seconds >= 0.0) {
-        return Err("damaged: its time is not a time".to_owned());
-    }
-    let name = &header.instructions;
-    if name.len() > LONGEST_NAME || !name.bytes().all(|b| b.is_ascii_alphanumeric()) {
-        return Err("damaged: its instructions have no such name".to_owned());
-    }
-    Ok(())
 }
 
 /// Sections lie end to end and end with the file of which `available` bytes remain: no gaps, no trailing bytes.

@@ -45,8 +45,8 @@ fn what_is_written_is_read_bit_for_bit() {
     assert_eq!(read, tally(&plan, 1, 3));
     assert_eq!(fixed, fixed_direct(&plan));
     let header = read_header(&path, &plan, 1).unwrap().unwrap();
-    assert_eq!((header.batches(), header.shard, header.seconds), (3, 1, 1.5));
-    assert_eq!((header.host.as_str(), header.written, header.relative_error), ("test", 1_700_000_000, 0.25));
+    assert_eq!((header.batches(), header.span, header.seconds()), (3, Span::Shard(1), 1.5));
+    assert_eq!((header.host_of(2), header.written, header.relative_error), ("test", 1_700_000_000, 0.25));
     // 65 x 64 bins are two blocks.
     let blocks = header.sections.iter().filter(|s| matches!(s.content, Content::Moments { set: 1, .. })).count();
     assert_eq!(blocks, 2);
@@ -98,7 +98,7 @@ fn newer_versions_other_plans_and_other_shards_are_named() {
     assert!(refusal(read_header(&path, &other, 1)).starts_with("of another plan: digest "));
     let header = read_header(&path, &plan, 1).unwrap().unwrap();
     fs::write(&path, frame(&header, VERSION + 1)).unwrap();
-    assert_eq!(refusal(read_header(&path, &plan, 1)), "format version 4 is newer; this program reads version 3");
+    assert_eq!(refusal(read_header(&path, &plan, 1)), "format version 5 is newer; this program reads version 4");
     fs::write(&path, "a letter to my aunt, long enough").unwrap();
     assert_eq!(refusal(read_header(&path, &plan, 1)), "not a checkpoint of lampyris");
 }
@@ -140,22 +140,40 @@ fn hostile_headers_are_refused_without_allocating_what_they_claim() {
     assert!(forged(|h, _| h.sections.clear()).contains("not those of the plan"));
     assert!(forged(|h, _| h.sections.swap(0, 1)).contains("not those of the plan"));
     assert!(forged(|h, _| h.digests = vec![[0; 16]; 5]).contains("5 batches in a shard of 4"));
-    assert!(forged(|h, _| h.seconds = f64::NAN).contains("not a time"));
-    assert!(forged(|h, _| h.seconds = -1.0).contains("not a time"));
-    assert!(forged(|h, _| h.instructions = "avx\u{7}".into()).contains("no such name"));
-    assert!(forged(|h, _| h.instructions = "a".repeat(17)).contains("no such name"));
+    assert!(forged(|h, _| h.span = Span::Before(1)).contains("holds the first shards together, not shard 1"));
+    assert!(forged(|h, _| h.runs[0].batches = 1).contains("its runs are not its batches"));
+    assert!(forged(|h, _| h.runs[0].seconds = f64::NAN).contains("not a time"));
+    assert!(forged(|h, _| h.runs[0].seconds = -1.0).contains("not a time"));
+    assert!(forged(|h, _| h.runs[0].instructions = "avx\u{7}".into()).contains("no such name"));
+    assert!(forged(|h, _| h.runs[0].instructions = "a".repeat(17)).contains("no such name"));
+    assert!(forged(|h, _| h.runs[0].host = "a\u{1b}[2J".into()).contains("no such name"));
+    assert!(forged(|h, _| h.runs[0].host = "a".repeat(10_000)).contains("longer than any of this plan"));
     // One batch more than the replicates hold.
-    assert!(forged(|h, _| h.digests.push([1; 16])).contains("not of the plan's shape"));
+    let more = |h: &mut Header| {
+        h.digests.push([1; 16]);
+        h.runs[0].batches += 1;
+    };
+    assert!(forged(|h, _| more(h)).contains("not of the plan's shape"));
 }
 
 #[test]
 fn hostile_lengths_inside_a_section_are_refused() {
-    // The first column of the first block claims 2^63 entries.
+    // The first list of the batch scores claims 2^63 entries.
     let claim = |h: &mut Header, sections: &mut Vec<u8>| {
-        sections[..10].copy_from_slice(&[0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x01]);
-        h.sections[0].checksum = checksum(&sections[..h.sections[0].bytes as usize]);
+        let scores = h.sections.iter_mut().find(|s| matches!(s.content, Content::Replicates { .. })).unwrap();
+        let bytes = &mut sections[scores.offset as usize..][..scores.bytes as usize];
+        bytes[1..11].copy_from_slice(&[0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x01]);
+        scores.checksum = checksum(bytes);
     };
     assert!(forged(claim).contains("not of the plan's shape"));
+    // A packed block that would be longer than a block of the plan.
+    let long = |h: &mut Header, sections: &mut Vec<u8>| {
+        let (old, new) = (h.sections[0].bytes, lz4_flex::block::compress(&vec![0; 1 << 20]));
+        sections.splice(..old as usize, new.iter().copied());
+        (h.sections[0].bytes, h.sections[0].checksum) = (new.len() as u64, checksum(&new));
+        h.sections[1..].iter_mut().for_each(|s| s.offset = s.offset - old + new.len() as u64);
+    };
+    assert!(forged(long).contains("not of the plan's shape"));
     // A header whose own list claims 2^60 digests.
     let (_temp, folder) = folder();
     let path = folder.shard_path(1);
@@ -181,7 +199,7 @@ fn never_replaced_by_fewer_batches_nor_by_others() {
     let kept = fs::read(&path).unwrap();
     let foreign = tally(&plan, 0, 4);
     let reason = refusal(save_tally(&folder, &plan, 1, &foreign, &fixed_direct(&plan)));
-    assert!(reason.contains("its batch 0 of the shard is another"), "{reason}");
+    assert!(reason.contains("its batch 0 is another"), "{reason}");
     assert_eq!(fs::read(&path).unwrap(), kept);
     // A file that is not ours: refused, kept.
     fs::write(&path, "precious").unwrap();
@@ -264,8 +282,8 @@ fn golden_tally(plan: &Plan) -> Tally {
 }
 
 #[test]
-fn the_golden_file_of_version_3_is_read_and_written_bit_for_bit() {
-    let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/shard-v3.ckpt");
+fn the_golden_file_of_version_4_is_read_and_written_bit_for_bit() {
+    let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/shard-v4.ckpt");
     // The numbers of the program may change without changing the format.
     let plan = Plan { numerics: 1, ..small() };
     let (_temp, folder) = folder();
@@ -274,7 +292,7 @@ fn the_golden_file_of_version_3_is_read_and_written_bit_for_bit() {
     let written = fs::read(folder.shard_path(1)).unwrap();
     let stored = fs::read(&golden).unwrap_or_default();
     if written != stored {
-        let new = std::env::temp_dir().join("shard-v3.ckpt");
+        let new = std::env::temp_dir().join("shard-v4.ckpt");
         fs::write(&new, &written).unwrap();
         panic!("the bytes have changed: raise VERSION if that is meant; the new file is {}", new.display());
     }

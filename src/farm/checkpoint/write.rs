@@ -1,12 +1,14 @@
 //! Tally -> checkpoint file.
 
-use super::columns::{encode_moments, encode_replicates};
-use super::{Checksum, Content, Header, MAGIC, Section, VERSION, block_range, checksum, layout, read_header};
+pub use super::columns::{encode_moments, encode_replicates};
+use super::{Checksum, Content, Header, Judged, MAGIC, Run, Section, Span, VERSION, block_range, checksum, layout};
+use super::{Reader, read_header};
 use crate::error::{Error, Result};
 use crate::farm::durable;
 use crate::farm::plan::Plan;
 use crate::job::SetShape;
 use crate::tally::{SetTally, Tally};
+use serde::Serialize;
 use std::io::{self, Write};
 use std::path::Path;
 
@@ -21,17 +23,35 @@ pub struct Snapshot<'a> {
     pub tally: &'a Tally,
     /// Direct light that is the same in every batch, one list a set.
     pub fixed_direct: &'a [Vec<f64>],
-    /// Time spent on these batches \[s\].
-    pub seconds: f64,
+    /// Who computed these batches, in order.
+    pub runs: &'a [Run],
     /// The present \[s since 1970\].
     pub written: u64,
-    /// This machine.
-    pub host: &'a str,
-    /// Instructions with which the kernels ran.
-    pub instructions: &'a str,
     /// Median relative error so far.
     pub relative_error: f64,
 }
+
+/// What a file shall say of itself; its sections come from elsewhere.
+#[derive(Clone, Copy, Debug)]
+pub struct Draft<'a> {
+    /// The plan it belongs to.
+    pub plan: &'a Plan,
+    /// Its shards.
+    pub span: Span,
+    /// Digests of its batches.
+    pub digests: &'a [Checksum],
+    /// Who computed them, in order.
+    pub runs: &'a [Run],
+    /// What was seen at the looks before; of a compaction only.
+    pub looks: &'a [Judged],
+    /// The present \[s since 1970\].
+    pub written: u64,
+    /// Median relative error so far.
+    pub relative_error: f64,
+}
+
+/// Gives the bytes of a section, the same ones every time.
+pub type Encode<'a> = &'a dyn Fn(Content) -> io::Result<Vec<u8>>;
 
 /// Writes `snapshot` to `path`, durably; false when a checkpoint with more batches stands there and stays.
 ///
@@ -40,22 +60,39 @@ pub struct Snapshot<'a> {
 /// overwritten then. [`Error::Io`].
 pub fn write(path: &Path, snapshot: &Snapshot) -> Result<bool> {
     let shapes = snapshot.plan.sets();
-    let contents = layout(&shapes);
-    let header = header_bytes(snapshot, sections(snapshot, &shapes, &contents));
-    durable::replace_if(path, |w| write_file(w, &header, snapshot, &shapes, &contents), || may_replace(path, snapshot))
+    let draft = Draft {
+        plan: snapshot.plan,
+        span: Span::Shard(snapshot.shard),
+        digests: &snapshot.tally.digests,
+        runs: snapshot.runs,
+        looks: &[],
+        written: snapshot.written,
+        relative_error: snapshot.relative_error,
+    };
+    write_draft(path, &draft, &|content| Ok(encode(content, snapshot, &shapes)))
+}
+
+/// Writes a file that says `draft` of itself, its sections by `encode`, durably; false when one with more batches stands
+/// at `path` and stays.
+///
+/// # Errors
+/// As [`write()`].
+pub fn write_draft(path: &Path, draft: &Draft, encode: Encode) -> Result<bool> {
+    let contents = layout(&draft.plan.sets());
+    let header = header_bytes(draft, sections(&contents, encode).map_err(Error::io(path))?);
+    durable::replace_if(path, |w| write_file(w, &header, &contents, encode), || may_replace(path, draft))
 }
 
 /// Magic, version, length, header and checksum.
-fn header_bytes(snapshot: &Snapshot, sections: Vec<Section>) -> Vec<u8> {
+fn header_bytes(draft: &Draft, sections: Vec<Section>) -> Vec<u8> {
     let header = Header {
-        plan: *snapshot.plan.content_digest().as_bytes(),
-        shard: snapshot.shard,
-        digests: snapshot.tally.digests.clone(),
-        seconds: snapshot.seconds,
-        written: snapshot.written,
-        host: snapshot.host.to_owned(),
-        instructions: snapshot.instructions.to_owned(),
-        relative_error: snapshot.relative_error,
+        plan: *draft.plan.content_digest().as_bytes(),
+        span: draft.span,
+        digests: draft.digests.to_vec(),
+        runs: draft.runs.to_vec(),
+        written: draft.written,
+        relative_error: draft.relative_error,
+        looks: draft.looks.to_vec(),
         sections,
     };
     frame(&header, VERSION)
@@ -76,53 +113,54 @@ pub(super) fn frame(header: &Header, version: u32) -> Vec<u8> {
 
 /// The table of sections. Every section is encoded here and once more when written, so that memory holds one
 /// section and not the file.
-fn sections(snapshot: &Snapshot, shapes: &[SetShape], contents: &[Content]) -> Vec<Section> {
+fn sections(contents: &[Content], encode: Encode) -> io::Result<Vec<Section>> {
     let mut offset = 0;
     let describe = |&content: &Content| {
-        let encoded = encode(content, snapshot, shapes);
+        let encoded = encode(content)?;
         let section = Section { content, offset, bytes: encoded.len() as u64, checksum: checksum(&encoded) };
         offset += section.bytes;
-        section
+        Ok(section)
     };
     contents.iter().map(describe).collect()
 }
 
-fn write_file(
-    w: &mut dyn Write,
-    header: &[u8],
-    snapshot: &Snapshot,
-    shapes: &[SetShape],
-    contents: &[Content],
-) -> io::Result<()> {
+fn write_file(w: &mut dyn Write, header: &[u8], contents: &[Content], encode: Encode) -> io::Result<()> {
     w.write_all(header)?;
-    contents.iter().try_for_each(|&content| w.write_all(&encode(content, snapshot, shapes)))
+    contents.iter().try_for_each(|&content| w.write_all(&encode(content)?))
 }
 
 fn encode(content: Content, snapshot: &Snapshot, shapes: &[SetShape]) -> Vec<u8> {
     let sets = &snapshot.tally.sets;
-    let encoded = match content {
+    match content {
         Content::Moments { set, block } => match &sets[set as usize] {
-            SetTally::Moments(m) => return encode_moments(&m.bins, block_range(&shapes[set as usize], block)),
+            SetTally::Moments(m) => encode_moments(&m.bins, block_range(&shapes[set as usize], block)),
             SetTally::Replicates(_) => unreachable!("the layout follows what the set keeps"),
         },
         Content::Replicates { set } => match &sets[set as usize] {
-            SetTally::Replicates(r) => return encode_replicates(r),
+            SetTally::Replicates(r) => encode_replicates(r),
             SetTally::Moments(_) => unreachable!("the layout follows what the set keeps"),
         },
-        Content::Flux => return encode_replicates(&snapshot.tally.flux),
-        Content::FixedDirect { set } => postcard::to_stdvec(&snapshot.fixed_direct[set as usize]),
-        Content::Monitors { set } => postcard::to_stdvec(&snapshot.tally.monitors[set as usize]),
-    };
-    encoded.expect("plain data of known length always has a postcard form")
+        Content::Flux => encode_replicates(&snapshot.tally.flux),
+        Content::FixedDirect { set } => encode_plain(&snapshot.fixed_direct[set as usize]),
+        Content::Monitors { set } => encode_plain(&snapshot.tally.monitors[set as usize]),
+    }
 }
 
-/// Whether the file at `path` is a state of the same shard with at most as many batches.
-fn may_replace(path: &Path, snapshot: &Snapshot) -> Result<bool> {
-    let Some(old) = read_header(path, snapshot.plan, snapshot.shard)? else { return Ok(true) };
-    let new = &snapshot.tally.digests;
+/// Fixed direct light of a set, or its monitors.
+pub fn encode_plain<T: Serialize>(values: &Vec<T>) -> Vec<u8> {
+    postcard::to_stdvec(values).expect("plain data of known length always has a postcard form")
+}
+
+/// Whether the file at `path` is a state of the same shards with at most as many batches.
+fn may_replace(path: &Path, draft: &Draft) -> Result<bool> {
+    let old = match draft.span {
+        Span::Shard(k) => read_header(path, draft.plan, k)?,
+        Span::Before(_) => Reader::open_compaction(path, draft.plan)?.map(|reader| reader.header().clone()),
+    };
+    let Some(old) = old else { return Ok(true) };
+    let new = draft.digests;
     if let Some(i) = old.digests.iter().zip(new).position(|(a, b)| a != b) {
-        let reason =
-            format!("its batch {i} of the shard is another than the one computed now; nothing was overwritten");
+        let reason = format!("its batch {i} is another than the one computed now; nothing was overwritten");
         return Err(Error::refused(path, reason));
     }
     Ok(old.digests.len() <= new.len())

@@ -23,7 +23,7 @@ impl<'a> Watch<'a> {
 
     /// True when `shards` complete a look not asked about before, and the goal has been reached.
     pub fn goal_reached(&mut self, shards: &[ShardStatus]) -> Result<bool> {
-        match self.plan.last_look(shards.iter().map(|s| (s.shard, s.batches))) {
+        match self.plan.last_look(shards.iter().map(|s| s.done(self.plan))) {
             Some(look) if look > self.asked => {
                 self.asked = look;
                 (self.goal_reached)(self.folder)

@@ -11,7 +11,7 @@ mod progress;
 
 pub use machine::workers_that_fit;
 
-use super::checkpoint::read_header;
+use super::checkpoint::{Header, read_compaction, read_header, read_progress};
 use super::folder::Folder;
 use super::plan::Plan;
 use super::status::ShardStatus;
@@ -90,12 +90,22 @@ fn first_failure(ended: Result<Ended>, dismissed: Result<()>) -> Result<Ended> {
 
 /// The progress of every shard, from headers.
 fn read_shards(folder: &Folder, plan: &Plan) -> Result<Vec<ShardStatus>> {
-    (0..plan.shard_count()).map(|k| read_shard(folder, plan, k)).collect()
+    let folded = read_compaction(folder, plan)?.map_or_else(Vec::new, |folded| folded.parts(plan));
+    let of = |k| Ok(shard_status(plan, k, read_progress(folder, plan, &folded, k)?));
+    (0..plan.shard_count()).map(of).collect()
 }
 
 fn read_shard(folder: &Folder, plan: &Plan, k: u64) -> Result<ShardStatus> {
-    let header = read_header(&folder.shard_path(k), plan, k)?;
-    Ok(header.map_or_else(|| ShardStatus::not_begun(plan, k), |header| ShardStatus::new(plan, &header)))
+    let header = match read_header(&folder.shard_path(k), plan, k)? {
+        // Somebody may have compacted it meanwhile.
+        None => read_compaction(folder, plan)?.and_then(|folded| folded.parts(plan).into_iter().nth(k as usize)),
+        found => found,
+    };
+    Ok(shard_status(plan, k, header))
+}
+
+fn shard_status(plan: &Plan, k: u64, header: Option<Header>) -> ShardStatus {
+    header.map_or_else(|| ShardStatus::not_begun(plan, k), |header| ShardStatus::new(plan, k, &header))
 }
 
 /// The workers and what is left to do.

@@ -9,9 +9,11 @@
 //! An exact bin has h = 0, a bin without information h = infinity. At which batches to look is for the plan to say.
 //! Here nothing is known of files, shards and workers: the decision is a function of the batches before the look.
 
+use crate::error::Result;
+use crate::farm::checkpoint::Checksum;
 use crate::farm::plan::Plan;
 use crate::job::Stop;
-use crate::tally::statistics::{Estimate, student_quantile};
+use crate::tally::statistics::{Estimate, select, student_quantile};
 
 /// What ended a run that has a goal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,9 +45,12 @@ pub struct Look {
 pub struct Goal {
     stop: Stop,
     confidence: f64,
-    /// Number, name and bins of each set that must reach it.
-    sets: Vec<(usize, String, usize)>,
+    /// Number and name of each set that must reach it.
+    sets: Vec<(usize, String)>,
 }
+
+/// Gives the estimate of every bin of a set that has a receiver to a function, in order.
+pub type Estimates<'a> = &'a dyn Fn(usize, &mut dyn FnMut(Estimate)) -> Result<()>;
 
 impl Goal {
     /// The goal of `plan`; None where the job has none.
@@ -53,29 +58,52 @@ impl Goal {
         let stop = plan.job.stop.clone()?;
         let wanted = |name: &String| stop.receivers.is_empty() || stop.receivers.contains(name);
         let sets = plan.sets().into_iter().enumerate();
-        let sets = sets.filter(|(_, s)| wanted(&s.name)).map(|(i, s)| (i, s.name.clone(), s.bins())).collect();
+        let sets = sets.filter(|(_, s)| wanted(&s.name)).map(|(i, s)| (i, s.name)).collect();
         Some(Goal { stop, confidence: plan.job.run.confidence, sets })
     }
 
     /// Numbers of the sets that must reach it.
     pub fn sets(&self) -> Vec<usize> {
-        self.sets.iter().map(|(set, ..)| *set).collect()
+        self.sets.iter().map(|(set, _)| *set).collect()
     }
 
-    /// Looks at the sets after `batches` batches; `estimate` gives that of (set, bin), None without a receiver.
-    pub fn look(&self, batches: u64, estimate: impl Fn(usize, usize) -> Option<Estimate>) -> Look {
+    /// Digest of what is asked, the number that is to be reached left out: a look that was judged answers the same question
+    /// again, whatever that number is.
+    pub fn question(&self) -> Checksum {
+        let sets: Vec<u64> = self.sets.iter().map(|(set, _)| *set as u64).collect();
+        let asked = postcard::to_stdvec(&(sets, self.stop.share, self.confidence));
+        let hash = blake3::hash(&asked.expect("plain data of known length always has a postcard form"));
+        hash.as_bytes()[..16].try_into().expect("a hash is longer than 16 bytes")
+    }
+
+    /// Looks at the sets after `batches` batches.
+    ///
+    /// # Errors
+    /// Those of `estimates`.
+    pub fn look(&self, batches: u64, estimates: Estimates) -> Result<Look> {
         let quantile = student_quantile(self.confidence, batches);
-        let mut look = Look { batches, relative_half_width: 0.0, set: String::new(), reached: false };
-        for (set, name, bins) in &self.sets {
-            let found = (0..*bins).filter_map(|bin| estimate(*set, bin));
-            let width = width_of_share(found.map(|e| relative_half_width(e, quantile)).collect(), self.stop.share);
-            if look.set.is_empty() || width > look.relative_half_width {
-                look.relative_half_width = width;
-                look.set.clone_from(name);
+        let (mut widest, mut of) = (0.0, None);
+        for (set, _) in &self.sets {
+            let pass = |take: &mut dyn FnMut(f64)| estimates(*set, &mut |e| take(relative_half_width(e, quantile)));
+            let width = width_of_share(pass, self.stop.share)?;
+            if of.is_none() || width > widest {
+                (widest, of) = (width, Some(*set));
             }
         }
-        look.reached = look.relative_half_width <= self.stop.relative_half_width;
-        look
+        Ok(self.judge(batches, widest, of.unwrap_or(0)))
+    }
+
+    /// The look after `batches` at which the set number `set` had the largest half width `relative_half_width`.
+    pub fn judge(&self, batches: u64, relative_half_width: f64, set: usize) -> Look {
+        let named = self.sets.iter().find(|(number, _)| *number == set);
+        let name = named.map(|(_, name)| name.clone()).unwrap_or_default();
+        let reached = relative_half_width <= self.stop.relative_half_width;
+        Look { batches, relative_half_width, set: name, reached }
+    }
+
+    /// The number of the set called `name`.
+    pub fn number_of(&self, name: &str) -> usize {
+        self.sets.iter().find(|(_, set)| set == name).map_or(0, |(number, _)| *number)
     }
 }
 
@@ -88,10 +116,15 @@ pub fn relative_half_width(estimate: Estimate, quantile: f64) -> f64 {
     }
 }
 
-/// The smallest h that at least `share` of the bins with `widths` do not exceed; 0 without bins: nothing is wanted.
-fn width_of_share(mut widths: Vec<f64>, share: f64) -> f64 {
-    let Some(last) = enough(widths.len(), share).checked_sub(1) else { return 0.0 };
-    *widths.select_nth_unstable_by(last, f64::total_cmp).1
+/// The smallest h that at least `share` of the bins, whose widths `pass` gives, do not exceed; 0 without bins: nothing is
+/// wanted.
+fn width_of_share(pass: impl Fn(&mut dyn FnMut(f64)) -> Result<()>, share: f64) -> Result<f64> {
+    let mut count = 0;
+    pass(&mut |_| count += 1)?;
+    match enough(count, share).checked_sub(1) {
+        Some(last) => select(last as u64, count as u64, pass),
+        None => Ok(0.0),
+    }
 }
 
 /// The least k with k / n >= share.
@@ -131,9 +164,15 @@ mod tests {
                 assert_eq!(enough(n, percent as f64 / 100.0), (n * percent).div_ceil(100), "{percent} % of {n}");
             }
         }
-        let widths = vec![f64::INFINITY, 0.3, 0.0, 0.1];
-        assert_eq!([0.25, 0.5, 0.75].map(|share| width_of_share(widths.clone(), share)), [0.0, 0.1, 0.3]);
-        assert_eq!(width_of_share(widths, 1.0), f64::INFINITY);
-        assert_eq!(width_of_share(Vec::new(), 1.0), 0.0);
+        let width = |widths: &[f64], share| {
+            let pass = |take: &mut dyn FnMut(f64)| {
+                widths.iter().for_each(|w| take(*w));
+                Ok(())
+            };
+            width_of_share(pass, share).unwrap()
+        };
+        let widths = [f64::INFINITY, 0.3, 0.0, 0.1];
+        assert_eq!([0.25, 0.5, 0.75, 1.0].map(|share| width(&widths, share)), [0.0, 0.1, 0.3, f64::INFINITY]);
+        assert_eq!(width(&[], 1.0), 0.0);
     }
 }

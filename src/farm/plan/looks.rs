@@ -12,6 +12,7 @@
 
 use super::Plan;
 use crate::error::{Error, Result};
+use std::ops::Range;
 
 /// Batches before the first look, at least: with 15 degrees of freedom a standard error is rarely half of what it
 /// should be; with one or two it often is.
@@ -32,16 +33,15 @@ impl Plan {
         all.take_while(|&look| look <= run.batches).collect()
     }
 
-    /// The last look that can be judged when `done` are the batches of shards (shard, batches), in shard order: every
-    /// batch before it is there.
-    pub fn last_look(&self, done: impl Iterator<Item = (u64, u64)>) -> Option<u64> {
+    /// The last look that can be judged when `done` are the ranges of batches that are there, in order: every
+    /// batch before it is.
+    pub fn last_look(&self, done: impl Iterator<Item = Range<u64>>) -> Option<u64> {
         let mut end = 0;
-        for (shard, batches) in done {
-            let range = self.shard(shard);
+        for range in done {
             if range.start > end {
                 break;
             }
-            end = range.start.saturating_add(batches).max(end);
+            end = range.end.max(end);
         }
         self.looks().into_iter().rfind(|&look| look <= end)
     }

@@ -13,7 +13,8 @@ pub use size::{KEPT_LIMIT, MAX_SHARDS, Sizes, human};
 
 use crate::error::Result;
 use crate::job::{
-    Camera, Channels, Estimator, Gonio, Grid, Job, Plane, Point, Region, Roulette, Sampling, SetShape, Source, Sphere,
+    Camera, Channels, Estimator, Gonio, Grid, Job, Plane, Point, Region, Replacement, Roulette, Sampling, SetShape,
+    Source, Sphere,
 };
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -96,6 +97,7 @@ struct Content<'a> {
     planes: &'a [Plane],
     spheres: &'a [Sphere],
     sources: &'a [Source],
+    // Replacements come after it where there are any: their files are among the inputs.
 }
 
 /// A camera with its absent fields marked: its own serialisation leaves them out, and two cameras could then
@@ -164,7 +166,15 @@ impl Plan {
             spheres,
             sources,
         };
-        let bytes = postcard::to_stdvec(&content).expect("plain data of known length always has a postcard form");
+        let mut bytes = bytes_of(&content);
+        if !self.job.replacements.is_empty() {
+            let replaced = |r: &'_ Replacement| (r.node.clone(), r.degree);
+            bytes.extend(bytes_of(&self.job.replacements.iter().map(replaced).collect::<Vec<_>>()));
+        }
+        // Behind the rest, and nothing without luminaires: jobs that have none keep their digests.
+        if !self.job.luminaires.is_empty() {
+            bytes.extend(serde_json::to_vec(&self.job.luminaires).expect("plain data always has a JSON form"));
+        }
         blake3::hash(&bytes)
     }
 
@@ -189,6 +199,10 @@ impl Plan {
     pub fn shards(&self) -> impl Iterator<Item = Range<u64>> + '_ {
         (0..self.shard_count()).map(|k| self.shard(k))
     }
+}
+
+fn bytes_of(content: &impl Serialize) -> Vec<u8> {
+    postcard::to_stdvec(content).expect("plain data of known length always has a postcard form")
 }
 
 fn camera_content(camera: &Camera) -> CameraContent<'_> {

@@ -47,7 +47,7 @@ impl GoalStatus {
     /// From the progress of the shards of `plan`, in shard order; None without a goal.
     pub(super) fn new(plan: &Plan, shards: &[ShardStatus]) -> Option<Self> {
         plan.job.stop.as_ref()?;
-        let last_look = plan.last_look(shards.iter().map(|s| (s.shard, s.batches)));
+        let last_look = plan.last_look(shards.iter().map(|s| s.done(plan)));
         let next_look = plan.looks().into_iter().find(|&look| Some(look) > last_look);
         let verdict = if last_look.is_some() { Verdict::Open } else { Verdict::NotReached };
         Some(GoalStatus { last_look, next_look, verdict, seen: None, expected_look: None, eta_seconds: None })

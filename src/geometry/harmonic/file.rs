@@ -63,8 +63,9 @@ impl File {
     pub fn bytes(&self, numbers: Numbers) -> Vec<u8> {
         let DVec3 { x, y, z } = self.center;
         let (degree, kind) = (self.series.degree(), numbers.name());
-        let header =
-            format!("{VERSION}\nconvention {CONVENTION}\ncenter {x} {y} {z}\ndegree {degree}\nnumbers {kind}\n\n");
+        let header = format!(
+            "{VERSION}\nconvention {CONVENTION}\ncenter {x:?} {y:?} {z:?}\ndegree {degree}\nnumbers {kind}\n\n"
+        );
         let mut bytes = header.into_bytes();
         let pairs = self.series.pairs();
         for k in 0..=degree {

@@ -1,7 +1,9 @@
 //! Star-shaped objects where they stand in the world, and the meshes that decide for most rays and segments.
 
+use super::beside::{Beside, End, TileBeside};
+use super::horizon::{Cone, Horizon};
 use super::shells::Shells;
-use super::{Star, normal_and_area};
+use super::{Bend, Crossing, Star, normal_and_area};
 use crate::error::{Error, Result};
 use crate::geometry::bvh::Build;
 use crate::geometry::mesh::{Mesh, bits};
@@ -9,9 +11,10 @@ use crate::geometry::simd::Path;
 use crate::geometry::visibility::{BUNDLES, Lanes, Points, Scratch};
 use crate::geometry::{Hit, Ray, hit};
 use crate::math::{DMat3, DVec3, Vec3};
+use std::ops::Range;
 use std::sync::Arc;
 
-/// How far beyond a triangle the next is looked for, as a share of the segment.
+/// How far beyond a triangle the next is looked for, as a share of the way there and the size of the object.
 const NEXT: f64 = 1e-9;
 
 /// A star-shaped object in the world.
@@ -33,6 +36,8 @@ struct Shelled {
     outer: Mesh,
     /// Points at least so many times as far from the centre as the surface in their direction are outside of both.
     reach: f64,
+    /// Where the object keeps its shape in the world.
+    horizon: Option<Horizon>,
 }
 
 impl Harmonic {
@@ -49,6 +54,14 @@ impl Harmonic {
         Ok(Harmonic { star, center, to_world, to_own, shells: None })
     }
 
+    /// Memory of its samples, meshes and horizon \[bytes\]; what the series takes is in proportion to its file.
+    pub(in crate::geometry) fn bytes(&self) -> u64 {
+        let of = |shells: &Arc<Shelled>| {
+            shells.inner.bytes() + shells.outer.bytes() + shells.horizon.as_ref().map_or(0, Horizon::bytes)
+        };
+        self.star.samples.bytes() + self.shells.as_ref().map_or(0, of)
+    }
+
     /// The object in its own coordinates.
     pub fn star(&self) -> &Star {
         &self.star
@@ -57,8 +70,17 @@ impl Harmonic {
     /// Corners of a box around it \[m\].
     pub fn bounds(&self) -> (DVec3, DVec3) {
         let rows = self.to_world.transpose();
-        let half = self.star.radii.1 * DVec3::new(rows.x_axis.length(), rows.y_axis.length(), rows.z_axis.length());
+        let half = self.star.bounds.high * DVec3::new(rows.x_axis.length(), rows.y_axis.length(), rows.z_axis.length());
         (self.center - half, self.center + half)
+    }
+
+    /// How much longer it is here than in its own coordinates, where that is the same in all directions.
+    fn even(&self) -> Option<f64> {
+        let columns = [self.to_world.x_axis, self.to_world.y_axis, self.to_world.z_axis];
+        let even = columns.iter().map(|c| c.length()).fold(0.0, f64::max);
+        let product = self.to_world.transpose() * self.to_world;
+        let off = product - DMat3::from_diagonal(DVec3::splat(even * even));
+        off.to_cols_array().iter().all(|x| x.abs() <= 1e-12 * even * even).then_some(even)
     }
 
     /// Its centre, the radius of a ball about that around it \[m\], and how much longer it is here than in its own coordinates, at most.
@@ -66,13 +88,8 @@ impl Harmonic {
         // No direction is stretched by more than the root of the sum of squares of a matrix.
         let columns = [self.to_world.x_axis, self.to_world.y_axis, self.to_world.z_axis];
         let whole = columns.iter().map(|c| c.length_squared()).sum::<f64>().sqrt();
-        // A turned and evenly scaled object, as most are, is stretched by the length of any column.
-        let even = columns.iter().map(|c| c.length()).fold(0.0, f64::max);
-        let product = self.to_world.transpose() * self.to_world;
-        let off = product - DMat3::from_diagonal(DVec3::splat(even * even));
-        let is_even = off.to_cols_array().iter().all(|x| x.abs() <= 1e-12 * even * even);
-        let stretch = if is_even { even } else { whole };
-        (self.center, stretch * self.star.radii.1, stretch)
+        let stretch = self.even().unwrap_or(whole);
+        (self.center, stretch * self.star.bounds.high, stretch)
     }
 
     /// The same object elsewhere.
@@ -86,13 +103,42 @@ impl Harmonic {
         self.star.contains(self.to_own * (p - self.center))
     }
 
-    /// True for points that may lie inside the outer mesh \[m\].
-    pub(in crate::geometry) fn is_near(&self, p: DVec3) -> bool {
+    /// True for points that may be inside the outer mesh \[m\].
+    fn is_near(&self, p: DVec3) -> bool {
         let own = self.to_own * (p - self.center);
-        let reach = self.shells.as_ref().map_or(f64::INFINITY, |shells| shells.reach);
         let length = own.length();
-        length < self.star.radii.0
-            || (length < self.star.radii.1 * reach && length < self.star.series.value(own / length) * reach)
+        let (low, high) = self.star.radii();
+        let reach = self.shells.as_ref().map_or(f64::INFINITY, |shells| shells.reach);
+        if length < low || length >= high * reach {
+            return length < low;
+        }
+        let (value, error) = self.star.samples.value(own / length);
+        length <= (value + error) * reach
+    }
+
+    /// Where `p` is \[m\].
+    pub(in crate::geometry) fn beside(&self, p: DVec3) -> Beside {
+        let own = self.to_own * (p - self.center);
+        let length = own.length();
+        let (low, high) = self.star.radii();
+        let reach = self.shells.as_ref().map_or(f64::INFINITY, |shells| shells.reach);
+        if length < low || length >= high * reach {
+            return Beside { inside: length < low, near: length < low, free: None, bend: None };
+        }
+        let n = own / length;
+        let (value, error) = self.star.samples.value(n);
+        if length > (value + error) * reach {
+            return Beside { inside: false, near: false, free: None, bend: None };
+        }
+        let bend = self.star.series.bend(n);
+        let (inside, near) = (length < bend.value, length < bend.value * reach);
+        let horizon = self.shells.as_ref().and_then(|shells| shells.horizon.as_ref());
+        let is_beside = near && !inside;
+        let free = horizon.filter(|_| is_beside).map(|horizon| {
+            let cone = horizon.cone(&self.star, own, &bend);
+            Cone { axis: (self.to_world * cone.axis).normalize(), ..cone }
+        });
+        Beside { inside, near, free, bend: is_beside.then_some(bend) }
     }
 
     /// The same object with meshes inside and outside of it, for rays that come from anywhere in the box `around` \[m\].
@@ -101,7 +147,7 @@ impl Harmonic {
         let coordinate = around.0.abs().max(around.1.abs()).max_element();
         let columns = [self.to_own.x_axis, self.to_own.y_axis, self.to_own.z_axis];
         let shrunk = columns.iter().map(|c| c.length_squared()).sum::<f64>().sqrt();
-        let margin = 64.0 / f64::from(1 << 24) * coordinate * shrunk / self.star.radii.0;
+        let margin = 64.0 / f64::from(1 << 24) * coordinate * shrunk / self.star.bounds.low;
         let shells = Shells::new(&self.star, margin);
         let mesh = |triangles: &[[DVec3; 3]]| {
             let place = |p: DVec3| (self.center + self.to_world * p).as_vec3();
@@ -110,8 +156,9 @@ impl Harmonic {
             let triangles: Vec<_> = triangles.iter().map(|&t| turned(t).map(place)).collect();
             Mesh::within(&triangles, Build::Thorough, around)
         };
-        self.shells =
-            Some(Arc::new(Shelled { inner: mesh(&shells.inner), outer: mesh(&shells.outer), reach: shells.reach }));
+        let horizon = self.even().map(|_| Horizon::new(&self.star));
+        let (inner, outer) = (mesh(&shells.inner), mesh(&shells.outer));
+        self.shells = Some(Arc::new(Shelled { inner, outer, reach: shells.reach, horizon }));
         self
     }
 
@@ -122,34 +169,47 @@ impl Harmonic {
         }
     }
 
-    /// Clears the bits of the points in `seen` that `apex` does not see for this object, of which the points `inside` it, and those
-    /// near it, are known.
+    /// Clears the bits of the points in `seen` that `apex` does not see for this object, `beside` which they are.
     pub(in crate::geometry) fn hide(
         &self,
         apex: Vec3,
         points: &Points,
-        [inside, near]: [&Lanes; 2],
+        beside: &TileBeside,
         seen: &mut Lanes,
         scratch: &mut Scratch,
     ) {
+        let here = self.beside(apex.as_dvec3());
         let mut undecided = *seen;
-        let at = apex.as_dvec3();
-        if let Some(shells) = self.shells.as_ref().filter(|_| !self.contains(at)) {
-            let is_near = self.is_near(at);
-            let (mut open, mut clear) = (*seen, *seen);
-            shells.inner.hide(apex, points, &mut open, scratch);
+        for bundle in 0..BUNDLES {
+            let (inside, free) = (beside.inside[bundle], beside.free(bundle, points, apex, &here, undecided[bundle]));
+            seen[bundle] &= if here.inside { inside } else { !inside };
+            undecided[bundle] = seen[bundle] & !free;
+        }
+        if undecided == [0; BUNDLES] {
+            return;
+        }
+        if let Some(shells) = self.shells.as_ref().filter(|_| !here.inside) {
+            let mut clear = undecided;
             shells.outer.hide(apex, points, &mut clear, scratch);
             for bundle in 0..BUNDLES {
                 // Inside the outer mesh both ends may see each other through the surface without crossing it.
-                let within = if is_near { near[bundle] } else { 0 };
-                let (asked, inside) = (seen[bundle], inside[bundle]);
-                seen[bundle] &= open[bundle] | inside;
-                undecided[bundle] = asked & (inside | open[bundle] & (!clear[bundle] | within));
+                let within = if here.near { beside.near[bundle] } else { 0 };
+                undecided[bundle] &= !clear[bundle] | within;
+            }
+            if undecided == [0; BUNDLES] {
+                return;
+            }
+            let mut open = undecided;
+            shells.inner.hide(apex, points, &mut open, scratch);
+            for bundle in 0..BUNDLES {
+                seen[bundle] &= !undecided[bundle] | open[bundle];
+                undecided[bundle] &= open[bundle];
             }
         }
         for (bundle, seen) in seen.iter_mut().enumerate() {
             for lane in bits(u32::from(undecided[bundle])) {
-                let blocked = self.crosses(apex.as_dvec3(), points.point(bundle, lane).as_dvec3());
+                let (a, b) = (apex.as_dvec3(), points.point(bundle, lane).as_dvec3());
+                let blocked = self.crosses([a, b], [here.end(), beside.end(bundle, lane)]);
                 *seen &= !(u16::from(blocked) << lane);
             }
         }
@@ -182,14 +242,11 @@ impl Harmonic {
 
     /// The first point of the surface along `ray`, at most `limit` away \[m\].
     pub(in crate::geometry) fn hit(&self, ray: &Ray, limit: f64) -> Option<Hit> {
-        let skipped = self.way_to(ray)?;
-        let direction = self.to_own * ray.direction;
-        let scale = direction.length();
-        let origin = self.to_own * (ray.origin + skipped * ray.direction - self.center);
-        let crossing = self.star.first_crossing(origin, direction / scale, (limit - skipped) * scale)?;
+        let Line { crossing, before, scale } =
+            self.first_within(ray, 0.0..limit, self.is_near(ray.origin), limit < f64::INFINITY)?;
         let normal = (self.to_own.transpose() * crossing.normal).normalize();
         let position = self.center + self.to_world * crossing.position;
-        Some(hit(ray, skipped + crossing.distance / scale, position, normal))
+        Some(hit(ray, before + crossing.distance / scale, position, normal))
     }
 
     /// How far along `ray` its surface is first met, by the series alone \[m\]: the twin that tests the meshes.
@@ -200,59 +257,85 @@ impl Harmonic {
         self.star.first_crossing(origin, own / scale, f64::INFINITY).map(|crossing| crossing.distance / scale)
     }
 
-    /// How far along `ray` there is certainly nothing; `None` where it misses the object \[m\].
-    fn way_to(&self, ray: &Ray) -> Option<f64> {
-        let Some(shells) = &self.shells else { return Some(0.0) };
-        let outer = shells.outer.closest_hit(ray, f64::INFINITY)?;
-        // From behind it starts between the shells, or inside.
-        Some(if outer.front { (outer.distance * (1.0 - 1e-9)).max(0.0) } else { 0.0 })
-    }
-
     /// True when the segment between `a` and `b` crosses the surface \[m\].
     pub(in crate::geometry) fn blocks(&self, a: Vec3, b: Vec3) -> bool {
         let (from, to) = (a.as_dvec3(), b.as_dvec3());
-        if let Some(shells) = self.shells.as_ref().filter(|_| !self.contains(from) && !self.contains(to)) {
-            let within = self.is_near(from) && self.is_near(to);
-            if !within && !shells.outer.blocks(a, b) {
+        let sides = [self.beside(from), self.beside(to)];
+        if sides[0].inside != sides[1].inside {
+            return true;
+        }
+        if let Some(shells) = self.shells.as_ref().filter(|_| !sides[0].inside) {
+            let leaves = |side: &Beside, way: DVec3| side.free.is_some_and(|cone| cone.holds(way));
+            if leaves(&sides[0], to - from) || leaves(&sides[1], from - to) {
+                return false;
+            }
+            let both_near = sides[0].near && sides[1].near;
+            if !both_near && !shells.outer.blocks(a, b) {
                 return false;
             }
             if shells.inner.blocks(a, b) {
                 return true;
             }
         }
-        self.crosses(from, to)
+        self.crosses([from, to], sides.each_ref().map(Beside::end))
     }
 
-    /// The same by the series, wherever the segment is inside the outer mesh.
-    fn crosses(&self, a: DVec3, b: DVec3) -> bool {
+    /// The same of two points on one side, by the series, wherever the segment is inside the outer mesh. Where the derivatives at an end
+    /// are known, they say how far from there it is clear.
+    fn crosses(&self, [a, b]: [DVec3; 2], ends: [End; 2]) -> bool {
         let whole = (b - a).length();
         if whole == 0.0 {
             return false;
         }
         let direction = (b - a) / whole;
-        let Some(shells) = &self.shells else { return self.crosses_between(a, direction, whole) };
-        let mut at = 0.0;
-        while at < whole {
-            let origin = a + at * direction;
-            let outer = shells.outer.closest_hit(&Ray { origin, direction }, whole - at);
-            let (enters, distance) = outer.map_or((false, whole - at), |hit| (hit.front, hit.distance));
-            // What is before an entrance is outside; what is before an exit, or the end, may not be.
-            if !enters && self.crosses_between(origin, direction, distance) {
-                return true;
-            }
-            // A little too far, so as to find no triangle twice: there is room between the mesh and the surface.
-            at += distance + NEXT * whole;
-        }
-        false
-    }
-
-    /// True when there is a point of the surface at most `end` from `from` along the unit vector `direction` \[m\].
-    fn crosses_between(&self, from: DVec3, direction: DVec3, end: f64) -> bool {
         let own = self.to_own * direction;
         let scale = own.length();
-        let origin = self.to_own * (from - self.center);
-        self.star.first_crossing(origin, own / scale, end * scale).is_some()
+        let clear = |at: DVec3, way: DVec3, bend: Option<&Bend>| {
+            let far =
+                |bend| self.star.clear(self.to_own * (at - self.center), way / scale, whole * scale, bend) / scale;
+            bend.map_or(0.0, far)
+        };
+        let between = clear(a, own, ends[0].bend)..whole - clear(b, -own, ends[1].bend);
+        self.first_within(&Ray { origin: a, direction }, between, ends[0].near, ends[1].near).is_some()
     }
+
+    /// The first crossing of a part of `ray`, by the series wherever that is inside the outer mesh. Its ends may be in there or are certainly
+    /// not.
+    fn first_within(&self, ray: &Ray, part: Range<f64>, starts_near: bool, ends_near: bool) -> Option<Line> {
+        let own = self.to_own * ray.direction;
+        let scale = own.length();
+        let look = |from: f64, way: f64| {
+            let origin = self.to_own * (ray.origin + from * ray.direction - self.center);
+            let crossing = self.star.first_crossing(origin, own / scale, way * scale)?;
+            Some(Line { crossing, before: from, scale })
+        };
+        let Range { start: mut at, end } = part;
+        let Some(shells) = &self.shells else { return look(at, end - at) };
+        let mut outside = !starts_near;
+        while at < end {
+            let here = Ray { origin: ray.origin + at * ray.direction, direction: ray.direction };
+            let Some(outer) = shells.outer.closest_hit(&here, end - at) else {
+                // No way in from outside, and none out to an end that is there.
+                return if outside || !ends_near { None } else { look(at, end - at) };
+            };
+            // What is before an entrance is outside.
+            let found = if outer.front { None } else { look(at, outer.distance) };
+            if found.is_some() {
+                return found;
+            }
+            outside = !outer.front;
+            // A little too far, so as to find no triangle twice: there is room between the mesh and the surface.
+            at += outer.distance + NEXT * (at + outer.distance + self.star.bounds.high / scale);
+        }
+        None
+    }
+}
+
+/// A crossing in its own coordinates, looked for from `before` on \[m\], with lengths `scale` times those of the world.
+struct Line {
+    crossing: Crossing,
+    before: f64,
+    scale: f64,
 }
 
 impl std::fmt::Debug for Harmonic {

@@ -1,4 +1,4 @@
-//! Series of real spherical harmonics on the unit sphere, and what their coefficients alone bound.
+//! Series of real spherical harmonics on the unit sphere.
 //!
 //! Schmidt semi-normalised functions with sqrt(2) for m > 0 and without the Condon-Shortley sign:
 //!
@@ -136,6 +136,11 @@ impl Series {
         Series::new(&[[value, 0.0]]).expect("one finite coefficient")
     }
 
+    /// Instructions that sum it.
+    pub(super) fn path(&self) -> Path {
+        self.path
+    }
+
     /// N.
     pub fn degree(&self) -> usize {
         self.degree
@@ -186,19 +191,9 @@ impl Series {
         squares.into_iter().map(f64::sqrt).collect()
     }
 
-    /// The bounds of r and its derivatives along great circles.
-    pub fn bounds(&self) -> Bounds {
-        let norms = self.norms();
-        let sum = |of: fn(f64) -> f64| norms.iter().enumerate().skip(1).map(|(k, c)| of(k as f64) * c).sum::<f64>();
-        let (middle, around) = (self.terms[0].cosine * self.terms[0].ahead, sum(|_| 1.0));
-        Bounds {
-            low: middle - around,
-            high: middle + around,
-            first: sum(|k| (0.5 * k * (k + 1.0)).sqrt()),
-            second: sum(|k| k * k),
-            third: sum(|k| k * k * k),
-            fourth: sum(|k| k * k * k * k),
-        }
+    /// The mean of r.
+    pub fn mean(&self) -> f64 {
+        self.terms[0].cosine * self.terms[0].ahead
     }
 }
 
@@ -296,24 +291,6 @@ fn sums<const DERIVATIVES: u32>(group: &[Row], n: DVec3) -> [[f64; LANES]; 6] {
         }
     }
     [a, b, da, db, dda, ddb]
-}
-
-/// What r and its derivatives along any great circle, by the angle, do not exceed; from |c_k| alone, so never too little and
-/// often too much.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bounds {
-    /// r is nowhere less.
-    pub low: f64,
-    /// r is nowhere more.
-    pub high: f64,
-    /// Magnitude of the gradient.
-    pub first: f64,
-    /// Magnitude of the second derivative.
-    pub second: f64,
-    /// Magnitude of the third derivative.
-    pub third: f64,
-    /// Magnitude of the fourth derivative.
-    pub fourth: f64,
 }
 
 /// All functions up to `degree` in the direction of the unit vector `n`: the pairs S_k^m cos m phi, S_k^m sin m phi, degree

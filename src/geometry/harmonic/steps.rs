@@ -1,9 +1,7 @@
 //! How far a function of one variable certainly has no zero, by its derivatives in one place and their bounds elsewhere.
 
-/// Times by which the cubic may outreach the parabola.
-const REACH: f64 = 1024.0;
-/// Halvings of the step, of a factor [`REACH`] in all, in search of the zero of the cubic.
-const HALVINGS: u32 = 12;
+/// Halvings between the zero of the parabola, or what is enough, in search of that of the cubic.
+const HALVINGS: u32 = 4;
 
 /// A function and its derivatives in one place.
 #[derive(Clone, Copy, Debug)]
@@ -17,6 +15,15 @@ impl Taylor {
     /// The same of the function times `k`.
     pub(super) fn times(self, k: f64) -> Taylor {
         Taylor { value: k * self.value, first: k * self.first, second: k * self.second }
+    }
+
+    /// The same less what it may be too great by.
+    pub(super) fn less(self, errors: Taylor) -> Taylor {
+        Taylor {
+            value: self.value - errors.value,
+            first: self.first - errors.first,
+            second: self.second - errors.second,
+        }
     }
 
     /// value + first s + second s^2/2 - third s^3/6: the least that the function can be at s.
@@ -41,18 +48,22 @@ impl Taylor {
 }
 
 /// A step within which a function has no zero that starts as `at`, whose value is not negative, and whose second and third derivatives
-/// stay within the bounds given: to the zero of the parabola, or near that of the cubic where it reaches farther.
-pub(super) fn safe_step(at: &Taylor, [second, third]: [f64; 2]) -> f64 {
+/// stay within the bounds given: `enough` where it is clear that far; else to the zero of the parabola, or near that of the cubic where it
+/// reaches farther.
+pub(super) fn safe_step(at: &Taylor, [second, third]: [f64; 2], enough: f64) -> f64 {
     let value = at.value.max(0.0);
+    if at.is_clear(enough, third) {
+        return enough;
+    }
     let root = (at.first * at.first + 2.0 * second * value).sqrt();
     let parabola = if at.first > 0.0 { (at.first + root) / second } else { 2.0 * value / (root - at.first) };
-    if at.is_clear(REACH * parabola, third) {
-        return REACH * parabola;
+    if parabola >= enough {
+        return enough;
     }
-    let (mut clear, mut blocked) = (1.0, REACH);
+    let (mut clear, mut blocked) = (parabola, enough);
     for _ in 0..HALVINGS {
         let middle = if blocked > 4.0 * clear { (clear * blocked).sqrt() } else { 0.5 * (clear + blocked) };
-        *(if at.is_clear(middle * parabola, third) { &mut clear } else { &mut blocked }) = middle;
+        *(if at.is_clear(middle, third) { &mut clear } else { &mut blocked }) = middle;
     }
-    clear * parabola
+    clear
 }

@@ -47,6 +47,21 @@ pub struct Asset {
 pub struct RootExtensions {
     #[serde(rename = "KHR_lights_punctual")]
     pub lights_punctual: Option<Lights>,
+    #[serde(rename = "EXT_lights_ies")]
+    pub lights_ies: Option<Profiles>,
+}
+
+#[derive(Deserialize)]
+pub struct Profiles {
+    pub lights: Vec<Profile>,
+}
+
+/// A photometric web of EXT_lights_ies.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub struct Profile {
+    pub uri: Option<String>,
+    pub buffer_view: Option<usize>,
 }
 
 #[derive(Deserialize)]
@@ -112,6 +127,18 @@ pub struct Node {
 pub struct NodeExtensions {
     #[serde(rename = "KHR_lights_punctual")]
     pub lights_punctual: Option<NodeLight>,
+    #[serde(rename = "EXT_lights_ies")]
+    pub lights_ies: Option<NodeProfile>,
+}
+
+/// A photometric web at a node.
+#[derive(Deserialize)]
+pub struct NodeProfile {
+    pub light: usize,
+    #[serde(default = "one")]
+    pub multiplier: f64,
+    #[serde(default = "white")]
+    pub color: [f64; 3],
 }
 
 #[derive(Deserialize)]

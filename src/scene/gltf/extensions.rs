@@ -5,7 +5,8 @@ use super::problem::{File, Warnings};
 use crate::error::Result;
 
 /// Extensions whose meaning is followed.
-const SUPPORTED: [&str; 3] = ["KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_mesh_quantization"];
+const SUPPORTED: [&str; 4] =
+    ["KHR_lights_punctual", "EXT_lights_ies", "KHR_materials_emissive_strength", "KHR_mesh_quantization"];
 
 /// Refuses a file that needs an extension not understood; lists those it merely uses, with the effect.
 pub fn check(file: File, document: &Document, warnings: &mut Warnings) -> Result<()> {
@@ -47,7 +48,7 @@ fn effect(name: &str) -> Option<&'static str> {
             "the PNG or JPEG copy of an image is read"
         }
         "EXT_mesh_gpu_instancing" => "each of its meshes stands once, at its node",
-        "EXT_lights_image_based" | "EXT_lights_ies" | "KHR_lights_environment" => "these lights are dark",
+        "EXT_lights_image_based" | "KHR_lights_environment" => "these lights are dark",
         "KHR_node_visibility" => "hidden nodes are rendered",
         "KHR_animation_pointer" => "the scene is rendered as it stands without animation",
         "MSFT_lod" | "MSFT_screencoverage" => "only the finest level of detail is rendered",

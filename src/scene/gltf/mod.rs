@@ -9,12 +9,13 @@
 //! model or an [`Error::Input`](crate::error::Error::Input) that names the field, never a panic.
 //!
 //! The order of the work, a file each: container and JSON (`document`), `extensions`, `buffers`, `nodes`, and at each
-//! node its mesh (`meshes`, `materials`, `images`), camera (`cameras`) and light (`lights`).
+//! node its mesh (`meshes`, `materials`, `images`), camera (`cameras`) and lights (`lights`, `ies`).
 
 mod buffers;
 mod cameras;
 mod document;
 mod extensions;
+mod ies;
 mod images;
 mod lights;
 mod materials;
@@ -57,6 +58,7 @@ pub fn load(name: &str, bytes: &[u8], fetch: &mut dyn FnMut(&str) -> Result<Vec<
         warnings.add("animations are ignored: nodes stand where they are without them");
     }
     let buffers = Buffers::load(file, &document, binary.as_deref(), &mut *fetch)?;
+    let webs = ies::webs(file, &document, &buffers, &mut *fetch, &mut warnings)?;
     let images = Images::new(file, &document, &buffers, fetch);
     let materials = Materials::new(file, &document, images);
     let nodes = nodes::walk(file, &document)?;
@@ -64,6 +66,9 @@ pub fn load(name: &str, bytes: &[u8], fetch: &mut dyn FnMut(&str) -> Result<Vec<
     let mut model = Model::default();
     for placed in &nodes {
         place(file, &document, placed, &mut baker, &mut model, &mut warnings)?;
+        if let Some(profile) = &placed.node.extensions.lights_ies {
+            model.lights.push(ies::light(file, &webs, placed, profile)?);
+        }
     }
     baker.finish(&mut model, &mut warnings);
     model.nodes.list = nodes.iter().map(Placed::entry).collect();

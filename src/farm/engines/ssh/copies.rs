@@ -7,12 +7,12 @@
 //! ```
 //!
 //! What comes back is read through and compared before it replaces anything: a longer checkpoint is taken where the
-//! one that stands here is its prefix, and refused by name where it is not.
+//! one that stands here is its prefix, and refused by name where it is not. Of a shard that was compacted here nothing is longer.
 
 use super::hosts::{Host, Login};
 use crate::error::{Error, Result};
 use crate::farm::attempts;
-use crate::farm::checkpoint::{Reader, read_header};
+use crate::farm::checkpoint::{Reader, read_compaction, read_header, read_progress};
 use crate::farm::durable;
 use crate::farm::engines::ask;
 use crate::farm::folder::Folder;
@@ -61,7 +61,7 @@ pub(super) fn send(host: &Host, folder: &Folder, root: &str, program: &str, shar
 pub(super) fn fetch(host: &Host, n: usize, folder: &Folder, plan: &Plan) -> Result<()> {
     let (Some(login), Some(there)) = (&host.login, &host.folder) else { return Ok(()) };
     let here = Folder::new(&folder.root().join("ssh").join(format!("host-{n}")));
-    durable::make_folder(here.root())?;
+    durable::make_inside(here.root())?;
     let mut back = rsync(login);
     back.arg("--recursive").args(BACK).arg(format!("{}:{there}/", login.destination)).arg(here.root());
     ask(&mut back, HINT)?;
@@ -77,12 +77,15 @@ fn rsync(login: &Login) -> Command {
 
 /// Takes from `copy` the checkpoints that are longer than those in `folder`, and attempts that are not known there.
 fn take(copy: &Folder, folder: &Folder, plan: &Plan) -> Result<()> {
+    let folded = read_compaction(folder, plan)?.map_or_else(Vec::new, |folded| folded.parts(plan));
     for (k, path) in copy.checkpoints()? {
         let Some(reader) = Reader::open(&path, plan, k)? else { continue };
-        let standing = read_header(&folder.shard_path(k), plan, k)?;
+        let standing = read_progress(folder, plan, &folded, k)?;
         let (old, new) = (standing.map(|header| header.digests).unwrap_or_default(), &reader.header().digests);
         if !new.starts_with(&old) && !old.starts_with(new) {
-            let reason = format!("contradicts {}", folder.shard_path(k).display());
+            let compacted = k < folded.len() as u64;
+            let other = if compacted { folder.compaction_path() } else { folder.shard_path(k) };
+            let reason = format!("contradicts {}", other.display());
             return Err(Error::refused(&path, reason));
         }
         if new.len() > old.len() {
@@ -97,17 +100,25 @@ fn take(copy: &Folder, folder: &Folder, plan: &Plan) -> Result<()> {
 /// Puts the file at `from`, of `batches` batches, in the place of the checkpoint of shard `k`.
 fn replace(folder: &Folder, k: u64, from: &Path, batches: usize, plan: &Plan) -> Result<()> {
     let to = folder.shard_path(k);
-    durable::make_folder(to.parent().expect("a checkpoint lies in a folder"))?;
+    durable::make_inside(to.parent().expect("a checkpoint lies in a folder"))?;
     let mut file = File::open(from).map_err(Error::io(from))?;
-    // Somebody else may have gone further meanwhile.
-    let shorter = || Ok(read_header(&to, plan, k)?.is_none_or(|header| header.digests.len() < batches));
+    // Somebody else may have gone further meanwhile, or have compacted the shard: its file is asked for first, as it is
+    // removed last.
+    let shorter = || {
+        let standing = match read_header(&to, plan, k)? {
+            Some(header) => header.digests.len(),
+            None => read_compaction(folder, plan)?.map_or(0, |folded| folded.digests_of(plan, k).len()),
+        };
+        Ok(standing < batches)
+    };
     durable::replace_if(&to, |w| std::io::copy(&mut file, w).map(|_| ()), shorter).map(|_| ())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::farm::testing::{plan, save};
+    use crate::farm::merge::compact::compact;
+    use crate::farm::testing::{JOB, fixed_direct, plan, plan_of, save, save_tally, tally};
 
     #[test]
     fn longer_checkpoints_are_taken_shorter_ones_left_and_others_refused() {
@@ -130,5 +141,30 @@ mod tests {
         std::fs::copy(copy.shard_path(1), &path).unwrap();
         assert!(matches!(take(&copy, &here, &plan), Err(Error::Refused { .. })));
         assert_eq!([0, 1, 2].map(batches), [3, 4, 2]);
+    }
+
+    #[test]
+    fn of_a_compacted_shard_nothing_comes_back() {
+        let (temp, plan) = (tempfile::tempdir().unwrap(), plan());
+        let folder = |name: &str| Folder::new(&temp.path().join(name));
+        let (here, copy) = (folder("here"), folder("copy"));
+        here.establish(&plan, &[]).unwrap();
+        for (folder, shard, done) in [(&here, 0, 4), (&here, 1, 4), (&copy, 0, 4), (&copy, 1, 2), (&copy, 2, 1)] {
+            assert!(save(folder, &plan, shard, done).unwrap());
+        }
+        assert_eq!(compact(&here, 7).unwrap().shards, 2);
+        take(&copy, &here, &plan).unwrap();
+        let numbers = || here.checkpoints().unwrap().into_iter().map(|(k, _)| k).collect::<Vec<_>>();
+        assert_eq!(numbers(), [2]);
+        // It was compacted after it had been compared.
+        replace(&here, 0, &copy.shard_path(0), 4, &plan).unwrap();
+        assert_eq!(numbers(), [2]);
+        // What contradicts the compaction is named with it.
+        let seed = plan_of(&JOB.replace("seed = 7", "seed = 8")).unwrap();
+        std::fs::remove_file(copy.shard_path(0)).unwrap();
+        assert!(save_tally(&copy, &plan, 0, &tally(&seed, 0, 2), &fixed_direct(&plan)).unwrap());
+        let refused = take(&copy, &here, &plan).unwrap_err().to_string();
+        assert!(refused.contains("contradicts") && refused.contains("compacted.ckpt"), "{refused}");
+        assert_eq!(numbers(), [2]);
     }
 }

@@ -1,0 +1,170 @@
+//! What a job says of lights: sources by formula, luminaires by their files.
+
+use super::Job;
+use super::check::Checker;
+use crate::error::Result;
+use serde::{Deserialize, Serialize};
+
+/// Largest intensity \[cd\] and flux \[lm\] that can be typed.
+const MOST_LIGHT: f64 = 1e12;
+/// Largest factor on the intensities of a file.
+const MOST_FACTOR: f64 = 1e6;
+/// Largest exponent of a cosine: a beam of a fifth of a degree.
+const MOST_EXPONENT: f64 = 1e6;
+
+/// `[[source]]`: a light source given by a formula.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, tag = "kind", rename_all = "snake_case")]
+pub enum Source {
+    /// The same intensity in all directions.
+    Omni {
+        /// Position \[m\].
+        position: [f64; 3],
+        /// Luminous intensity \[cd\].
+        intensity: f64,
+    },
+    /// Full intensity inside a cone, none outside another, between them as a spot of KHR_lights_punctual.
+    Spot {
+        /// Position \[m\].
+        position: [f64; 3],
+        /// Axis; need not be a unit vector.
+        direction: [f64; 3],
+        /// Luminous intensity on the axis \[cd\].
+        intensity: f64,
+        /// Half angle of the inner cone.
+        inner_degrees: f64,
+        /// Half angle of the outer cone.
+        outer_degrees: f64,
+    },
+    /// Intensity times a power of the cosine to the axis, in the hemisphere around it.
+    CosPower {
+        /// Position \[m\].
+        position: [f64; 3],
+        /// Axis; need not be a unit vector.
+        direction: [f64; 3],
+        /// Luminous intensity on the axis \[cd\].
+        intensity: f64,
+        /// The power: 1 for a small Lambert surface.
+        exponent: f64,
+    },
+}
+
+/// `[[luminaire]]`: the photometric web of an IES or EULUMDAT file at a place.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Luminaire {
+    /// The file, relative to the job file.
+    pub file: String,
+    /// Node of the scene in whose coordinates the following are given; left out: those of the world.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub node: Option<String>,
+    /// Position of the photometric centre \[m\]; left out, with a node: its origin.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub position: Option<[f64; 3]>,
+    /// Where the direction of the two angles 0 points.
+    #[serde(default = "down")]
+    pub aim: [f64; 3],
+    /// Where C0 points; what of it lies along the aim does not count.
+    #[serde(default = "right")]
+    pub c0: [f64; 3],
+    /// Factor on the intensities.
+    #[serde(default = "one")]
+    pub multiplier: f64,
+    /// Another, 0 ..= 1.
+    #[serde(default = "one")]
+    pub dimming: f64,
+    /// What shines: a point, or the luminous opening that the file describes.
+    #[serde(default)]
+    pub extent: Extent,
+    /// Flux to which the web is scaled before the two factors \[lm\]; left out: as the file has it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub flux: Option<f64>,
+}
+
+/// What of a luminaire shines.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Extent {
+    /// A point: right from some five times its size on.
+    #[default]
+    Point,
+    /// The opening in the file, with the luminance that its intensities ask for.
+    Opening,
+}
+
+fn down() -> [f64; 3] {
+    [0.0, -1.0, 0.0]
+}
+
+fn right() -> [f64; 3] {
+    [1.0, 0.0, 0.0]
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+impl Job {
+    /// The files of luminaires, each once, in the order in which the job first names them.
+    pub fn luminaire_files(&self) -> Vec<&str> {
+        let mut files: Vec<&str> = Vec::new();
+        let mut known = std::collections::HashSet::new();
+        files.extend(self.luminaires.iter().map(|l| l.file.as_str()).filter(|file| known.insert(*file)));
+        files
+    }
+}
+
+/// Refuses lights out of range, and a job without any.
+pub(super) fn check(c: &Checker, job: &Job) -> Result<()> {
+    for (i, source) in job.sources.iter().enumerate() {
+        check_source(c, &format!("source[{i}]"), source)?;
+    }
+    for (i, luminaire) in job.luminaires.iter().enumerate() {
+        check_luminaire(c, &format!("luminaire[{i}]"), luminaire, job.scene.is_some())?;
+    }
+    let lit = job.scene.is_some() || !job.sources.is_empty() || !job.luminaires.is_empty();
+    c.that("scene", "(missing)", lit, "a scene file, or at least one [[source]] or [[luminaire]]")
+}
+
+fn check_source(c: &Checker, at: &str, source: &Source) -> Result<()> {
+    let (position, direction, intensity) = match source {
+        Source::Omni { position, intensity } => (position, None, *intensity),
+        Source::Spot { position, direction, intensity, .. }
+        | Source::CosPower { position, direction, intensity, .. } => (position, Some(direction), *intensity),
+    };
+    c.position(&format!("{at}.position"), *position)?;
+    let fits = intensity > 0.0 && intensity <= MOST_LIGHT;
+    c.that(&format!("{at}.intensity"), intensity, fits, "above 0, at most 1e12 cd")?;
+    if let Some(direction) = direction {
+        c.direction(&format!("{at}.direction"), *direction)?;
+    }
+    match *source {
+        Source::Omni { .. } => Ok(()),
+        Source::Spot { inner_degrees: inner, outer_degrees: outer, .. } => {
+            let fits = outer > 0.0 && outer <= 90.0;
+            c.that(&format!("{at}.outer_degrees"), outer, fits, "above 0, at most 90")?;
+            let fits = inner >= 0.0 && inner < outer;
+            c.that(&format!("{at}.inner_degrees"), inner, fits, "0 or more, below outer_degrees")
+        }
+        Source::CosPower { exponent, .. } => {
+            let fits = (0.0..=MOST_EXPONENT).contains(&exponent);
+            c.that(&format!("{at}.exponent"), exponent, fits, "0 .. 1e6")
+        }
+    }
+}
+
+fn check_luminaire(c: &Checker, at: &str, luminaire: &Luminaire, has_scene: bool) -> Result<()> {
+    if let Some(node) = &luminaire.node {
+        c.that(&format!("{at}.node"), node, has_scene, "a node only with a scene")?;
+    }
+    let placed = luminaire.node.is_some() || luminaire.position.is_some();
+    c.that(&format!("{at}.position"), "(missing)", placed, "a position, or a node")?;
+    c.position(&format!("{at}.position"), luminaire.position.unwrap_or_default())?;
+    c.direction(&format!("{at}.aim"), luminaire.aim)?;
+    c.direction(&format!("{at}.c0"), luminaire.c0)?;
+    let factor = luminaire.multiplier;
+    c.that(&format!("{at}.multiplier"), factor, factor > 0.0 && factor <= MOST_FACTOR, "above 0, at most 1e6")?;
+    c.share(&format!("{at}.dimming"), luminaire.dimming)?;
+    let flux = luminaire.flux.unwrap_or(1.0);
+    c.that(&format!("{at}.flux"), flux, flux > 0.0 && flux <= MOST_LIGHT, "above 0, at most 1e12 lm")
+}

@@ -1,0 +1,116 @@
+//! The lights of a job, hung into the scene.
+
+use super::photometric_web::{Luminaire, Photometry, Placement};
+use super::{Extended, Light, Model, Reflectance, Surface};
+use crate::error::{Error, Result};
+use crate::job;
+use crate::math::{DMat3, DMat4, DVec3, PI};
+use crate::photometry::Colour;
+
+/// Scaled to a flux farther from its own than this, a web is mentioned.
+const TOLERATED: f64 = 0.02;
+
+impl Light {
+    /// A source of a job.
+    pub(super) fn of_job(source: &job::Source) -> Light {
+        let radians = |degrees: f64| degrees * PI / 180.0;
+        match *source {
+            job::Source::Omni { position, intensity } => {
+                Light::Omni { position: position.into(), intensity: Colour::grey(intensity) }
+            }
+            job::Source::Spot { position, direction, intensity, inner_degrees, outer_degrees } => Light::Spot {
+                position: position.into(),
+                direction: DVec3::from(direction).normalize(),
+                intensity: Colour::grey(intensity),
+                inner: radians(inner_degrees),
+                outer: radians(outer_degrees),
+            },
+            job::Source::CosPower { position, direction, intensity, exponent } => Light::CosPower {
+                position: position.into(),
+                direction: DVec3::from(direction).normalize(),
+                intensity: Colour::grey(intensity),
+                exponent,
+            },
+        }
+    }
+}
+
+impl Model {
+    /// Hangs the `luminaire` with the web of `photometry`. `job` is the name of the job file, `at` the entry that asks for it.
+    ///
+    /// # Errors
+    /// [`Error::Input`] where there is not one node of its name, or its directions or the node's transform leave none.
+    pub fn hang(&mut self, (job, at): (&str, &str), luminaire: &job::Luminaire, photometry: &Photometry) -> Result<()> {
+        let world = match &luminaire.node {
+            Some(name) => self.only_node(job, at, name)?,
+            None => DMat4::IDENTITY,
+        };
+        let position = world.transform_point3(luminaire.position.unwrap_or_default().into());
+        let frame = DMat3::from_mat4(world);
+        let placement =
+            Placement::new(position, frame, luminaire.aim.into(), luminaire.c0.into()).ok_or_else(|| {
+                let value = format!("{:?} with aim {:?}", luminaire.c0, luminaire.aim);
+                Error::input(
+                    job,
+                    format!("{at}.c0"),
+                    value,
+                    "directions that are not parallel, and a node that flattens none",
+                )
+            })?;
+        let own = photometry.flux();
+        let scale = luminaire.flux.map_or(1.0, |flux| flux / own);
+        for warning in &photometry.warnings {
+            self.warn(format!("luminaire {}: {warning}", luminaire.file));
+        }
+        if (scale - 1.0).abs() > TOLERATED {
+            let flux = own * scale;
+            self.warn(format!("luminaire {}: its web of {own:.1} lm is scaled to {flux:.1} lm", luminaire.file));
+        }
+        let factor = Colour::grey(scale * luminaire.multiplier * luminaire.dimming);
+        let light = Luminaire::new(photometry, &placement, factor);
+        match luminaire.extent {
+            job::Extent::Point => self.lights.push(Light::Luminaire(light)),
+            job::Extent::Opening => {
+                let extended = Extended::new(light, &photometry.opening, &placement).ok_or_else(|| {
+                    let allowed = "point: its file gives no luminous opening";
+                    Error::input(job, format!("{at}.extent"), "opening", allowed)
+                })?;
+                self.add_faces(extended);
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds a luminaire with extent, whose faces absorb what meets them.
+    fn add_faces(&mut self, extended: Extended) {
+        let surface = self.surfaces.len() as u32;
+        for face in &extended.faces {
+            let first = self.positions.len() as u32;
+            self.positions.extend(face);
+            self.triangles.push([first, first + 1, first + 2]);
+            self.surface_of.push(surface);
+        }
+        let reflectance = Reflectance::Lambert(Colour::BLACK);
+        let (name, double_sided) = ("luminous opening".to_owned(), extended.flat);
+        self.surfaces.push(Surface { name, reflectance, double_sided, emission: Colour::BLACK });
+        self.extended.push(extended);
+    }
+
+    /// From the coordinates of the one node called `name` to those of the world.
+    fn only_node(&self, job: &str, at: &str, name: &str) -> Result<DMat4> {
+        match self.nodes.called(name)[..] {
+            [place] => Ok(self.nodes.list[place].world),
+            ref places => {
+                let allowed = format!("the name of one node of the scene, not of {}", places.len());
+                Err(Error::input(job, format!("{at}.node"), name, allowed))
+            }
+        }
+    }
+
+    /// Adds a warning that is not there yet: many luminaires share a file.
+    fn warn(&mut self, warning: String) {
+        if !self.warnings.contains(&warning) {
+            self.warnings.push(warning);
+        }
+    }
+}

@@ -1,0 +1,180 @@
+//! Luminaires with their openings: the right lux near by and far off, and the right luminance in the eye.
+
+use crate::photometry;
+use crate::scenes::{UP, assert_near, boxed, compare_both_ends, luminaire, lux, planned};
+use lampyris::geometry::Ray;
+use lampyris::math::{DVec3, PI};
+use lampyris::random::{Domain, Generator, Stream, sphere};
+use lampyris::scene::Scene;
+use lampyris::transport::direct::from_panels;
+use lampyris::transport::receiver::{Receiver, Response, look};
+
+const SHAPES: [&str; 7] =
+    ["rectangle", "disc", "box", "cylinder_upright", "cylinder_along_c0", "cylinder_across_c0", "sphere"];
+
+fn random(name: &str) -> Generator {
+    Stream::new(19, Domain::Trajectory, name).generator(0)
+}
+
+/// A luminaire at the origin with its opening, aim and C0 askew.
+fn askew(file: &str) -> Scene {
+    let job =
+        luminaire(file, "position = [0, 0, 0]\naim = [0.3, -1.0, 0.2]\nc0 = [1.0, 0.0, 0.5]\nextent = \"opening\"");
+    planned(&job, &[]).unwrap_or_else(|e| panic!("{e}")).0
+}
+
+/// Mean of `samples` estimates of the illuminance, and the standard error of the mean \[lx\].
+fn sampled(samples: u32, mut estimate: impl FnMut() -> f64) -> (f64, f64) {
+    let scores: Vec<f64> = (0..samples).map(|_| estimate()).collect();
+    let n = f64::from(samples);
+    let mean = scores.iter().sum::<f64>() / n;
+    let square = scores.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / (n - 1.0);
+    (mean, (square / n).sqrt())
+}
+
+fn meter(scene: &Scene, position: [f64; 3], normal: [f64; 3]) -> Receiver {
+    Receiver { position: scene.place(position), normal: DVec3::from(normal).normalize(), response: Response::Cosine }
+}
+
+#[test]
+fn a_lambertian_disc_is_exact_near_by_and_a_point_far_off() {
+    let at = |extent: &str| {
+        planned(&luminaire("lambert_100lm.ies", &format!("position = [0.0, 0.0, 0.0]\nextent = \"{extent}\"")), &[])
+            .unwrap()
+            .0
+    };
+    let (disc, point) = (at("opening"), at("point"));
+    assert_near(disc.sources.flux(), 100.0, 2e-5);
+    let mut rng = random("disc");
+    let radius = 0.1;
+    for distance in [0.02, 0.1, 0.3, 1.0, 5.0] {
+        // E = M r^2/(r^2 + d^2), M = flux over area.
+        let exact = 100.0 / PI / (radius * radius + distance * distance);
+        let receiver = meter(&disc, [0.0, -distance, 0.0], UP);
+        let (mean, error) = sampled(1024, || from_panels(&disc, &receiver, 64, &mut rng).luminance());
+        assert!((mean - exact).abs() < 5.0 * error + 1e-4 * exact, "{distance} m: {mean} +- {error} lx, not {exact}");
+        assert!(error < 5e-3 * exact, "{distance} m: {error} of {exact}");
+        let as_point = lux(&point, [0.0, -distance, 0.0], UP);
+        assert_near(as_point, 100.0 / PI / (distance * distance), 1e-9);
+    }
+    // 1591.5 lx at 0.1 m where the point has twice as much; 31.8 lx and 1 % less at 1 m.
+    assert_near(lux(&point, [0.0, -0.1, 0.0], UP) / (100.0 / PI / 0.02), 2.0, 1e-9);
+}
+
+/// Area of a shape of the test files as seen along `w`, given in the axes length, width, aim \[m2\].
+fn shown(shape: &str, [x, y, z]: [f64; 3]) -> f64 {
+    let across = |a: f64, b: f64| (a * a + b * b).sqrt();
+    match shape {
+        "rectangle" => 0.6 * 0.3 * z.abs(),
+        "disc" => PI * 0.1 * 0.15 * z.abs(),
+        "box" => 0.4 * 0.2 * z.abs() + 0.4 * 0.1 * y.abs() + 0.2 * 0.1 * x.abs(),
+        "cylinder_upright" => PI * 0.01 * z.abs() + 0.2 * 0.3 * across(x, y),
+        "cylinder_along_c0" => PI * 0.0025 * x.abs() + 0.1 * 0.6 * across(y, z),
+        "cylinder_across_c0" => PI * 0.0025 * y.abs() + 0.1 * 0.6 * across(x, z),
+        "sphere" => PI * 0.0225,
+        other => panic!("{other}"),
+    }
+}
+
+#[test]
+fn the_eye_sees_intensity_over_shown_area_in_twenty_directions() {
+    let aim = DVec3::new(0.3, -1.0, 0.2).normalize();
+    let c0 = DVec3::new(1.0, 0.0, 0.5);
+    let c0 = (c0 - c0.dot(aim) * aim).normalize();
+    let axes = [c0, c0.cross(aim), aim];
+    for shape in SHAPES {
+        let file = format!("opening_{shape}.ies");
+        let (scene, web) = (askew(&file), photometry(&file).web);
+        let mut rng = random(shape);
+        let mut worst: f64 = 0.0;
+        for _ in 0..20 {
+            let w = sphere(rng.uniform2());
+            let local = axes.map(|axis| axis.dot(w));
+            let t = lampyris::math::acos(local[2].clamp(-1.0, 1.0));
+            let intensity = web.intensity(t, lampyris::math::atan2(local[1], local[0]));
+            // From afar, towards a point near the middle of the opening.
+            let eye = scene.place([0.0; 3]) + 3.0 * w + DVec3::splat(1e-3);
+            let seen = look(&scene, &Ray { origin: eye, direction: -w }, &mut rng).emitted.luminance();
+            let expected = intensity / shown(shape, local);
+            worst = worst.max((seen / expected - 1.0).abs());
+        }
+        // Flat faces instead of round ones; f32 corners.
+        let tolerance = match shape {
+            "sphere" => 5e-3,
+            "rectangle" | "box" => 1e-5,
+            _ => 2e-3,
+        };
+        assert!(worst < tolerance, "{shape}: luminance off by {worst}");
+    }
+}
+
+#[test]
+fn far_off_an_opening_lights_as_a_point() {
+    for shape in SHAPES {
+        let scene = askew(&format!("opening_{shape}.ies"));
+        let point = luminaire("full.ies", "position = [0, 0, 0]\naim = [0.3, -1.0, 0.2]\nc0 = [1.0, 0.0, 0.5]");
+        let point = planned(&point, &[]).unwrap().0;
+        let mut rng = random(shape);
+        for position in [[0.0, -20.0, 3.0], [15.0, -10.0, -8.0], [4.0, 18.0, 6.0]] {
+            let normal = position.map(|x: f64| -x);
+            let receiver = meter(&scene, position, normal);
+            let (mean, error) = sampled(128, || from_panels(&scene, &receiver, 64, &mut rng).luminance());
+            let expected = lux(&point, position, normal);
+            assert!(
+                (mean - expected).abs() < 5.0 * error + 1e-3 * expected,
+                "{shape}: {mean} +- {error}, not {expected}"
+            );
+            assert!(error < 8e-3 * expected, "{shape}: {error} of {expected}");
+        }
+    }
+}
+
+#[test]
+fn the_lux_on_the_walls_of_a_closed_box_sum_up_to_the_flux_of_an_opening() {
+    let size = [3.0, 2.0, 4.0];
+    for shape in SHAPES {
+        let experiment = boxed(&photometry(&format!("opening_{shape}.ies")), "opening", 0.0, super::scenes::SOMEWHERE);
+        let mut rng = random(shape);
+        // A random place on a random wall, in proportion to area: the sum is the mean times the whole area.
+        let areas: Vec<f64> = (0..6).map(|k| size[(k / 2 + 1) % 3] * size[(k / 2 + 2) % 3]).collect();
+        let all: f64 = areas.iter().sum();
+        let (mean, error) = sampled(8_000, || {
+            let mut left = rng.uniform() * all;
+            let wall = areas.iter().position(|area| {
+                left -= area;
+                left < 0.0
+            });
+            let wall = wall.unwrap_or(5);
+            let (axis, side) = (wall / 2, (wall % 2) as f64);
+            let mut position = [0, 1, 2].map(|k| rng.uniform() * size[k]);
+            position[axis] = side * size[axis];
+            let mut normal = [0.0; 3];
+            normal[axis] = 1.0 - 2.0 * side;
+            all * from_panels(&experiment.scene, &meter(&experiment.scene, position, normal), 1, &mut rng).luminance()
+        });
+        let flux = experiment.scene.sources.flux();
+        assert!((mean - flux).abs() < 5.0 * error, "{shape}: {mean} +- {error} lm, not {flux}");
+        assert!(error < 0.03 * flux, "{shape}: {error} of {flux}");
+    }
+}
+
+#[test]
+fn light_of_an_opening_is_the_same_from_both_ends() {
+    // Reverse paths find the opening by hitting it, and see its luminance; histories leave it; receivers sample it. A flat one
+    // that shines along its plane is so bright there that paths would take long: it gets the light of a Lambert surface.
+    for (shape, light) in [("rectangle", "lambert_100lm.ies"), ("box", "full.ies"), ("sphere", "full.ies")] {
+        let mut web = photometry(light);
+        web.opening = photometry(&format!("opening_{shape}.ies")).opening;
+        // So large that paths find it, and that nothing near it is near a point.
+        let opening = &mut web.opening;
+        [&mut opening.length, &mut opening.width, &mut opening.height].into_iter().for_each(|x| *x *= 4.0);
+        compare_both_ends(shape, 2048, |job| boxed(&web, "opening", 0.6, job));
+    }
+}
+
+#[test]
+fn a_point_has_no_opening() {
+    let job = luminaire("full.ies", "position = [0, 0, 0]\nextent = \"opening\"");
+    let error = planned(&job, &[]).map(|_| ()).unwrap_err().to_string();
+    assert!(error.contains("luminaire[0].extent = opening: point: its file gives no luminous opening"), "{error}");
+}
