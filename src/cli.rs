@@ -1,8 +1,10 @@
-//! Command line: run, plan, work, status, merge, extend, compact, audit, fit, luminaire, validate. Types only; what they do is in `commands.rs`.
+//! Command line: run, plan, work, status, merge, submit, extend, compact, audit, fit, luminaire, validate. Types only; what they
+//! do is in `commands.rs`.
 //!
 //! Flags say where and with how many processes; none of them changes a number. Only the job does.
 
-use clap::{Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use lampyris::farm::engines::slurm::TimeLimit;
 use lampyris::fit::MAX_LANCZOS;
 use lampyris::geometry::harmonic::MAX_DEGREE;
 use lampyris::geometry::harmonic::file::Numbers;
@@ -67,13 +69,16 @@ pub enum Command {
         parent: Option<i32>,
     },
     /// Say how far a folder is, from checkpoint headers; of a goal, whether it is reached, where that is quickly read.
-    #[command(after_help = "Example:\n  lampyris status out/room --json")]
+    #[command(after_help = "Examples:\n  lampyris status out/room --watch\n  lampyris status out/room --json")]
     Status {
         /// Folder of the plan.
         dir: PathBuf,
         /// Print JSON.
         #[arg(long)]
         json: bool,
+        /// Look again every few seconds until all is done.
+        #[arg(long, conflicts_with = "json")]
+        watch: bool,
     },
     /// Merge checkpoints into results, also those of an unfinished run (exit code 3).
     #[command(after_help = "Example:\n  lampyris merge out/room copied-from-other-machine -o out/all")]
@@ -85,6 +90,11 @@ pub enum Command {
         #[arg(short, long, value_name = "OUT")]
         output: Option<PathBuf>,
     },
+    /// Compute on many machines: by Slurm, or by ssh with GNU parallel; the same command again submits what is missing.
+    #[command(after_help = "Examples:\n  lampyris submit jobs/room.toml -o out/room --engine slurm --time 1:00:00\n  \
+                      lampyris submit out/room --engine slurm --array-limit 50 --sbatch '--account=light'\n  \
+                      lampyris submit out/room --engine ssh --hosts hosts.txt")]
+    Submit(Submit),
     /// Add batches to a planned folder, whether it is finished or not: its checkpoints stay and are continued.
     #[command(after_help = "Example:\n  lampyris extend out/room --batches 512\n  lampyris run out/room")]
     Extend {
@@ -157,6 +167,47 @@ pub enum Command {
         #[arg(long, value_name = "TEXT", requires = "markdown")]
         note: Option<String>,
     },
+}
+
+/// What `submit` was asked to do.
+#[derive(Debug, Args)]
+pub struct Submit {
+    /// Folder of a plan, or a job file, which is planned first.
+    #[arg(value_name = "DIR|JOB")]
+    pub target: PathBuf,
+    /// Folder of the plan of a job file [default: out/<job name>].
+    #[arg(short, long, value_name = "DIR")]
+    pub output: Option<PathBuf>,
+    /// Who carries the work to machines: slurm or ssh.
+    #[arg(long, value_name = "ENGINE")]
+    pub engine: Engine,
+    /// With slurm: shards at work at a time, at most.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    pub array_limit: Option<u64>,
+    /// With slurm: time limit of a job, as Slurm writes it [default: 1:00:00]; a shard that needs longer goes on in another.
+    #[arg(long, value_name = "T")]
+    pub time: Option<TimeLimit>,
+    /// With slurm: the partition.
+    #[arg(long, value_name = "P")]
+    pub partition: Option<String>,
+    /// With slurm: further options of sbatch.
+    #[arg(long, value_name = "OPTIONS", allow_hyphen_values = true)]
+    pub sbatch: Option<String>,
+    /// With slurm: submit nothing, print scripts and commands; a job file is planned all the same.
+    #[arg(long)]
+    pub dry_run: bool,
+    /// With ssh: the file of hosts; a line has processes, [user@]host[:port], and a folder where DIR is not shared.
+    #[arg(long, value_name = "FILE")]
+    pub hosts: Option<PathBuf>,
+}
+
+/// What runs workers on many machines.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Engine {
+    /// A job array.
+    Slurm,
+    /// GNU parallel and ssh.
+    Ssh,
 }
 
 /// A share such as `1%`.

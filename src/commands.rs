@@ -1,15 +1,21 @@
 //! One function for each subcommand: what it computes, what it prints, how it exits. Farm and report meet here.
 
+mod submit;
+mod watch;
+
 use crate::cli::Command;
 use lampyris::error::{Error, Result};
 use lampyris::farm::audit::{self, audit};
 use lampyris::farm::coordinator::{self, Options};
+use lampyris::farm::engines::missing::Missing;
+use lampyris::farm::engines::slurm;
 use lampyris::farm::folder::{Folder, plan_text};
 use lampyris::farm::inputs::{Prepared, prepare};
 use lampyris::farm::merge::compact::Compacted;
-use lampyris::farm::merge::{self, goal_reached};
+use lampyris::farm::merge::goal::Look;
+use lampyris::farm::merge::{self, goal_reached, looks};
 use lampyris::farm::plan::{Plan, human};
-use lampyris::farm::status::{Status, now, status};
+use lampyris::farm::status::{Seen, Status, now, status};
 use lampyris::farm::worker::{self, Order};
 use lampyris::fit;
 use lampyris::geometry::simd;
@@ -57,8 +63,10 @@ pub fn execute(command: Command) -> Result<Outcome> {
         Command::Run { job, output, workers, quiet } => run(&job, output, Options { workers, quiet }),
         Command::Plan { job, output } => plan(&job, output),
         Command::Work { dir, shard, threads, parent } => work(&dir, shard, threads, parent),
-        Command::Status { dir, json } => show_status(&dir, json),
+        Command::Status { dir, watch: true, .. } => watch::watch(&Folder::new(&dir)),
+        Command::Status { dir, json, .. } => show_status(&dir, json),
         Command::Merge { dirs, output } => merge_and_report(&dirs, output),
+        Command::Submit(request) => submit::submit(request),
         Command::Extend { dir, batches } => extend(&dir, batches),
         Command::Compact { dir } => compact(&dir),
         Command::Audit { dir, sample, seed } => {
@@ -129,35 +137,78 @@ fn establish(job: &Path, output: Option<PathBuf>) -> Result<(Folder, Plan)> {
 }
 
 fn work(dir: &Path, shard: u64, threads: Option<usize>, parent: Option<i32>) -> Result<Outcome> {
+    // A worker of a coordinator answers to it, wherever that runs.
+    let task = if parent.is_none() { slurm::Task::of_environment() } else { None };
+    let begun = |begun: &worker::Begun| {
+        // The log of a job shows every attempt.
+        task.iter().for_each(|task| crate::say(&format!("{begun} ({task})\n")));
+    };
     let order = Order { folder: Folder::new(dir), shard, threads, parent };
-    Ok(match worker::work(&order)? {
+    let ended = worker::work(&order, &begun)?;
+    if let Some(task) = task {
+        answer(&task, shard, ended);
+    }
+    Ok(match ended {
         worker::Ended::Done => Outcome { text: format!("shard {shard}: done\n"), exit: Exit::Done },
-        worker::Ended::Stopped => Outcome { text: format!("shard {shard}: stopped\n"), exit: Exit::Stopped },
+        worker::Ended::Stopped | worker::Ended::TimeUp { .. } => {
+            Outcome { text: format!("shard {shard}: stopped\n"), exit: Exit::Stopped }
+        }
     })
+}
+
+/// Does what Slurm expects of its task after `ended`; returns only where the process shall end by itself.
+fn answer(task: &slurm::Task, shard: u64, ended: worker::Ended) {
+    match ended {
+        worker::Ended::Done => {}
+        worker::Ended::Stopped => {
+            crate::say(&format!("shard {shard}: checkpoint written, waiting to be ended\n"));
+            task.wait_to_be_killed()
+        }
+        worker::Ended::TimeUp { added: 0 } => crate::say(&format!(
+            "shard {shard}: no batch fits into the time limit; submit again with a longer --time\n"
+        )),
+        worker::Ended::TimeUp { added } => {
+            crate::say(&format!("shard {shard}: {added} more batches, time is up, to be requeued\n"));
+            match task.requeue() {
+                Ok(()) => task.wait_to_be_killed(),
+                Err(e) => crate::say(&format!("shard {shard}: not requeued: {e}\n")),
+            }
+        }
+    }
 }
 
 fn show_status(dir: &Path, json: bool) -> Result<Outcome> {
     let folder = Folder::new(dir);
-    let mut status = status(&folder)?;
-    if status.refused.is_empty() && looks_cheap(&folder, &status)? {
-        match goal_reached(&[folder]) {
-            Ok(reached) => status.judge(reached),
-            Err(e @ Error::Refused { .. }) => status.refused.push(e.to_string()),
-            Err(e) => return Err(e),
-        }
-    }
+    let status = judged_status(&folder, CHEAP)?;
     let exit = if status.refused.is_empty() { Exit::Done } else { Exit::Refused };
     let shown = |e| Error::Failed(format!("status has no JSON form: {e}"));
     let text = if json { serde_json::to_string_pretty(&status).map_err(shown)? + "\n" } else { status.to_string() };
     Ok(Outcome { text, exit })
 }
 
-/// True when a look has come and little has to be read for it.
-fn looks_cheap(folder: &Folder, status: &Status) -> Result<bool> {
+/// The progress of a folder and, where checkpoints of at most `most` bytes have to be read for it, where its goal stands.
+fn judged_status(folder: &Folder, most: u64) -> Result<Status> {
+    let mut status = status(folder)?;
+    if status.refused.is_empty() && looks_cheap(folder, &status, most)? {
+        match looks(std::slice::from_ref(folder)) {
+            Ok(looks) => {
+                let reached = looks.last().filter(|look| look.reached).map(|look| look.batches);
+                let seen = |look: &Look| Seen { batches: look.batches, relative_half_width: look.relative_half_width };
+                status.judge(&folder.read_plan()?, reached, looks.last().map(seen));
+            }
+            Err(e @ Error::Refused { .. }) => status.refused.push(e.to_string()),
+            Err(e) => return Err(e),
+        }
+    }
+    Ok(status)
+}
+
+/// True when a look has come and at most `most` bytes have to be read for it.
+fn looks_cheap(folder: &Folder, status: &Status, most: u64) -> Result<bool> {
     let Some(look) = status.goal.and_then(|goal| goal.last_look) else { return Ok(false) };
     let plan = folder.read_plan()?;
     let shards = look.div_ceil(plan.job.run.batches_per_shard);
-    Ok(plan.sizes().checkpoint.saturating_mul(shards) <= CHEAP)
+    Ok(plan.sizes().checkpoint.saturating_mul(shards) <= most)
 }
 
 fn merge_and_report(dirs: &[PathBuf], output: Option<PathBuf>) -> Result<Outcome> {
@@ -167,8 +218,20 @@ fn merge_and_report(dirs: &[PathBuf], output: Option<PathBuf>) -> Result<Outcome
     let (plan, merged) = merge::merge(&folders, &output)?;
     let summary = report::write(&plan, &merged, &output)?;
     let exit = if merged.missing.is_empty() { Exit::Done } else { Exit::Incomplete };
-    let text = format!("{summary}results in {}\n", output.display());
+    let mut text = format!("{summary}results in {}\n", output.display());
+    if let ([folder], Exit::Incomplete) = (&folders[..], exit) {
+        text += &slurm::go_on(folder, &missing(folder)?)?.unwrap_or_default();
+    }
     Ok(Outcome { text, exit })
+}
+
+/// What is still to be computed in `folder`.
+fn missing(folder: &Folder) -> Result<Missing> {
+    let status = judged_status(folder, u64::MAX)?;
+    match status.refused.is_empty() {
+        true => Ok(Missing::of(&folder.read_plan()?, &status)),
+        false => Err(Error::refused(folder.root(), status.refused.join("\n"))),
+    }
 }
 
 fn extend(dir: &Path, batches: u64) -> Result<Outcome> {

@@ -56,7 +56,7 @@
 //! | 4 | [`tally`] | scores of a batch, moments, statistics | what it counts, and where |
 //! | 4 | [`scene`] | surfaces, sources, photometric webs, laws of reflection, glTF | receivers, seeds |
 //! | 5 | [`transport`] | the equations: trajectories, direct light, connections | files, threads, shards, pictures |
-//! | 6 | [`farm`] | plan, worker processes, checkpoints, merge | files of results |
+//! | 6 | [`farm`] | plan, worker processes, checkpoints, merge, engines for many machines | files of results |
 //! | 7 | [`report`] | EXR, CSV, PNG, JSON | how the numbers were made |
 //! | 8 | [`fit`] | spherical harmonics fitted to a mesh, and their errors | light, jobs, histories |
 //! | 8 | [`validate`] | cases with an exact answer, run and judged | files, printing |

@@ -242,7 +242,7 @@ fn wrong_usage_is_exit_code_2() {
 #[test]
 fn every_help_has_an_example() {
     let folder = folder_with(JOB);
-    for command in ["run", "plan", "work", "status", "merge", "fit"] {
+    for command in ["run", "plan", "work", "status", "merge", "submit", "fit"] {
         let text = expect(folder.path(), 0, &[command, "--help"]);
         assert!(text.contains("Example") && text.contains(&format!("lampyris {command}")), "{text}");
     }

@@ -5,6 +5,8 @@
 //! DIR/inputs/<digest>.<ext>      the job file and every input file, by content
 //! DIR/shards/shard-000012.ckpt   one checkpoint for each shard
 //! DIR/shards/compacted.ckpt      the first shards together, once they have been compacted
+//! DIR/attempts/...               who has begun which shard; no number depends on it
+//! DIR/slurm/, DIR/ssh/           scripts, logs and copies of `lampyris submit`
 //! DIR/...                        results
 //! ```
 //!
@@ -64,6 +66,11 @@ impl Folder {
     /// The checkpoint of shard `k`.
     pub fn shard_path(&self, k: u64) -> PathBuf {
         self.root.join("shards").join(format!("shard-{k:06}.ckpt"))
+    }
+
+    /// Who has begun shard `k`.
+    pub fn attempts_path(&self, k: u64) -> PathBuf {
+        self.root.join("attempts").join(format!("shard-{k:06}.jsonl"))
     }
 
     /// The first shards together.

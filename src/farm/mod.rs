@@ -13,18 +13,22 @@
 //! thinning      vertices of many trajectories -> those that are connected
 //! realization   batch index -> scores, in parallel
 //! checkpoint    one durable file for each shard
-//! status        headers -> progress
+//! attempts      who has begun which shard, for those who watch
+//! status        headers and attempts -> progress
 //! worker        computes one shard
 //! coordinator   starts, watches, restarts worker processes
 //! merge         checkpoints -> one result, in parallel; the first of them -> one checkpoint
 //! audit         batches computed again, and compared with checkpoints
+//! engines       carry shards to many machines: Slurm, ssh
 //! ```
 
+pub mod attempts;
 pub mod audit;
 pub mod checkpoint;
 pub mod coordinator;
 mod degree;
 pub mod durable;
+pub mod engines;
 pub mod folder;
 pub mod inputs;
 mod local;

@@ -1,11 +1,20 @@
-//! Checkpoint headers -> progress: batches done, rate, age, time left, relative error so far.
+//! Checkpoint headers and attempts -> progress: batches done, who is at work where, rates, time left, relative error.
 //!
-//! Only headers are read, so asking is cheap and never disturbs a worker. The relative error is an estimate: each
-//! shard looks at its own batches, and their median is scaled to all batches done.
+//! Only headers and the short files of attempts are read, so asking is cheap, disturbs no worker, and works from any
+//! machine that sees the folder, whoever started the workers. The relative error is an estimate: each shard looks at
+//! its own batches, and their median is scaled to all batches done.
 //!
 //! Headers say which looks of a run with a goal have come, not what was seen there: that is for the one who asks
 //! to find out and to fill in ([`Status::judge`]).
 
+mod goal;
+mod hosts;
+mod view;
+
+pub use goal::{GoalStatus, Seen, Verdict};
+pub use hosts::HostStatus;
+
+use super::attempts::{self, Attempt};
 use super::checkpoint::{Header, read_compaction, read_header};
 use super::folder::Folder;
 use super::plan::Plan;
@@ -27,10 +36,14 @@ pub struct ShardStatus {
     pub of: u64,
     /// Time spent \[s\].
     pub seconds: f64,
-    /// Age of the checkpoint \[s\].
+    /// Age of the checkpoint \[s\]; without one, of the last attempt.
     pub age_seconds: u64,
-    /// Machine that wrote it.
+    /// Machine that wrote it; without one, of the last attempt.
     pub host: String,
+    /// Worker processes that have begun it.
+    pub attempts: u64,
+    /// True while it seems to be at work: unfinished, and begun or written not long ago.
+    pub active: bool,
     /// Median relative error of this shard alone, an estimate; None when nothing is known.
     pub relative_error_estimate: Option<f64>,
 }
@@ -50,8 +63,10 @@ pub struct Status {
     pub shard_count: u64,
     /// Shards whose checkpoint is complete.
     pub shards_done: u64,
-    /// Shards that seem to be at work: unfinished, and written not long ago.
+    /// Shards that seem to be at work: unfinished, and begun or written not long ago.
     pub shards_active: u64,
+    /// Worker processes that have begun a shard.
+    pub attempts: u64,
     /// Batches per second of one worker; None before the first batch.
     pub rate_of_a_worker: Option<f64>,
     /// Time left with as many workers as now \[s\]; None when none is at work.
@@ -62,33 +77,12 @@ pub struct Status {
     pub goal: Option<GoalStatus>,
     /// Time spent by all workers \[s\].
     pub seconds: f64,
-    /// Every shard with a checkpoint.
+    /// Every machine that has written a checkpoint or begun a shard.
+    pub hosts: Vec<HostStatus>,
+    /// Every shard with a checkpoint or an attempt.
     pub shards: Vec<ShardStatus>,
     /// Checkpoints that were refused, by name, and why.
     pub refused: Vec<String>,
-}
-
-/// How far a run with a goal is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-pub struct GoalStatus {
-    /// The last look before which every batch is done; None before the first.
-    pub last_look: Option<u64>,
-    /// The look after that; None when the limit comes first.
-    pub next_look: Option<u64>,
-    /// What is known of the looks so far.
-    pub verdict: Verdict,
-}
-
-/// What is known of the looks of a run so far.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Verdict {
-    /// Nobody has looked: it would take reading tallies.
-    Open,
-    /// The goal was reached at no look so far.
-    NotReached,
-    /// The goal was reached after this number of batches: the run is done.
-    ReachedAt(u64),
 }
 
 /// The present \[s since 1970\].
@@ -112,8 +106,11 @@ pub fn status(folder: &Folder) -> Result<Status> {
             shards.entry(k).or_insert_with(|| ShardStatus::new(&plan, k, &header));
         }
     }
-    let shards = shards.into_values().collect();
-    Ok(Status::new(&plan, shards, refused))
+    for k in attempts::begun(folder)?.into_iter().filter(|&k| k < plan.shard_count()) {
+        let shard = shards.entry(k).or_insert_with(|| ShardStatus::not_begun(&plan, k));
+        shard.tried(&plan, &attempts::read(folder, k)?);
+    }
+    Ok(Status::new(&plan, shards.into_values().collect(), refused))
 }
 
 /// The header that was read; None, and why among `refused`, for a file that was refused.
@@ -131,22 +128,35 @@ impl ShardStatus {
     /// Of shard `k`, from the header of its checkpoint.
     pub fn new(plan: &Plan, k: u64, header: &Header) -> Self {
         let range = plan.shard(k);
-        ShardStatus {
+        let mut shard = ShardStatus {
             shard: k,
             batches: header.batches(),
             of: range.end - range.start,
             seconds: header.seconds(),
-            age_seconds: now().saturating_sub(header.written),
+            age_seconds: age(header.written),
             host: header.runs.last().map(|run| run.host.clone()).unwrap_or_default(),
+            attempts: 0,
+            active: false,
             relative_error_estimate: finite(header.relative_error),
-        }
+        };
+        shard.active = shard.is_recent(plan, shard.age_seconds);
+        shard
     }
 
     /// Of shard `k`, without a checkpoint.
     pub fn not_begun(plan: &Plan, k: u64) -> Self {
         let range = plan.shard(k);
-        let (of, host) = (range.end - range.start, String::new());
-        ShardStatus { shard: k, batches: 0, of, seconds: 0.0, age_seconds: 0, host, relative_error_estimate: None }
+        ShardStatus {
+            shard: k,
+            batches: 0,
+            of: range.end - range.start,
+            seconds: 0.0,
+            age_seconds: 0,
+            host: String::new(),
+            attempts: 0,
+            active: false,
+            relative_error_estimate: None,
+        }
     }
 
     /// The range of its batches that are done.
@@ -155,9 +165,26 @@ impl ShardStatus {
         start..start + self.batches
     }
 
-    fn active(&self, checkpoint_seconds: f64) -> bool {
+    /// Takes the attempts on this shard into account.
+    fn tried(&mut self, plan: &Plan, attempts: &[Attempt]) {
+        self.attempts = attempts.len() as u64;
+        let Some(last) = attempts.iter().max() else { return };
+        let since = age(last.started);
+        if self.host.is_empty() {
+            (self.age_seconds, self.host) = (since, last.host.clone());
+        }
+        self.active = self.active || self.is_recent(plan, since);
+    }
+
+    /// True when it is unfinished, and something of it happened `seconds` ago: not long.
+    fn is_recent(&self, plan: &Plan, seconds: u64) -> bool {
         // A batch may be longer than the interval, so twice the interval and some more is "not long ago".
-        self.batches < self.of && self.age_seconds as f64 <= 2.0 * checkpoint_seconds + 30.0
+        self.batches < self.of && seconds as f64 <= 2.0 * plan.job.run.checkpoint_seconds + 30.0
+    }
+
+    /// Batches per second of its workers; None before the first batch.
+    pub fn rate(&self) -> Option<f64> {
+        finite(self.batches as f64 / self.seconds).filter(|&r| r > 0.0)
     }
 }
 
@@ -167,62 +194,53 @@ impl Status {
         let run = &plan.job.run;
         let batches: u64 = shards.iter().map(|s| s.batches.min(s.of)).sum();
         let seconds = shards.iter().map(|s| s.seconds).fold(0.0, |a, b| a + b);
-        let shards_active = shards.iter().filter(|s| s.active(run.checkpoint_seconds)).count() as u64;
-        let rate = finite(batches as f64 / seconds).filter(|&r| r > 0.0);
-        let left = (run.batches - batches) as f64;
-        let eta = rate.filter(|_| shards_active > 0).map(|r| left / (r * shards_active as f64));
-        Status {
+        let mut status = Status {
             job: plan.name.clone(),
             plan: plan.digest.clone(),
             batches,
             of: run.batches,
             shard_count: plan.shard_count(),
             shards_done: shards.iter().filter(|s| s.batches >= s.of).count() as u64,
-            shards_active,
-            rate_of_a_worker: rate,
-            eta_seconds: eta,
+            shards_active: shards.iter().filter(|s| s.active).count() as u64,
+            attempts: shards.iter().map(|s| s.attempts).sum(),
+            rate_of_a_worker: finite(batches as f64 / seconds).filter(|&r| r > 0.0),
+            eta_seconds: None,
             relative_error_estimate: relative_error(&shards, batches),
             goal: GoalStatus::new(plan, &shards),
             seconds,
+            hosts: hosts::of(&shards),
             shards,
             refused,
-        }
+        };
+        status.eta_seconds = status.seconds_until(run.batches);
+        status
     }
 
-    /// Fills in what was seen at the looks so far: at which one the goal was reached, if at any.
-    pub fn judge(&mut self, reached: Option<u64>) {
+    /// Fills in what was seen at the looks so far: at which one the goal was reached, if at any, and how near the last
+    /// one came. `plan` is that of this status.
+    pub fn judge(&mut self, plan: &Plan, reached: Option<u64>, seen: Option<Seen>) {
         let Some(goal) = &mut self.goal else { return };
-        goal.verdict = reached.map_or(Verdict::NotReached, Verdict::ReachedAt);
-        if reached.is_some() {
+        goal.judge(plan, reached, seen);
+        match goal.expected_look {
             // Whatever shards are unfinished, nobody is to finish them.
-            (self.shards_active, self.eta_seconds) = (0, None);
+            _ if reached.is_some() => (self.shards_active, self.eta_seconds) = (0, None),
+            Some(look) => {
+                let seconds = self.seconds_until(look);
+                self.goal.iter_mut().for_each(|goal| goal.eta_seconds = seconds);
+            }
+            None => {}
         }
     }
-}
 
-impl GoalStatus {
-    /// From the progress of the shards of `plan`, in shard order; None without a goal.
-    fn new(plan: &Plan, shards: &[ShardStatus]) -> Option<Self> {
-        plan.job.stop.as_ref()?;
-        let last_look = plan.last_look(shards.iter().map(|s| s.done(plan)));
-        let next_look = plan.looks().into_iter().find(|&look| Some(look) > last_look);
-        let verdict = if last_look.is_some() { Verdict::Open } else { Verdict::NotReached };
-        Some(GoalStatus { last_look, next_look, verdict })
+    /// True when nothing is left to compute, as far as is known.
+    pub fn is_done(&self) -> bool {
+        self.batches >= self.of || self.goal.is_some_and(|goal| matches!(goal.verdict, Verdict::ReachedAt(_)))
     }
-}
 
-impl std::fmt::Display for GoalStatus {
-    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        match (self.verdict, self.last_look) {
-            (Verdict::ReachedAt(batches), _) => return write!(f, "goal reached at {batches} batches: done"),
-            (Verdict::Open, Some(look)) => write!(f, "look at {look} batches: `lampyris merge` says what it shows, ")?,
-            (Verdict::NotReached, Some(look)) => write!(f, "goal not reached at {look} batches, ")?,
-            (_, None) => {}
-        }
-        match self.next_look {
-            Some(look) => write!(f, "next look at {look} batches"),
-            None => write!(f, "no look left before the limit"),
-        }
+    /// Time until `batches` are done with as many workers as now \[s\]; None when none is at work.
+    fn seconds_until(&self, batches: u64) -> Option<f64> {
+        let rate = self.rate_of_a_worker.filter(|_| self.shards_active > 0)?;
+        Some(batches.saturating_sub(self.batches) as f64 / (rate * self.shards_active as f64))
     }
 }
 
@@ -236,36 +254,7 @@ fn finite(x: f64) -> Option<f64> {
     Some(x).filter(|x| x.is_finite())
 }
 
-impl std::fmt::Display for Status {
-    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        writeln!(
-            f,
-            "{}: {} of {} batches, {} of {} shards done",
-            self.job, self.batches, self.of, self.shards_done, self.shard_count
-        )?;
-        if let Some(rate) = self.rate_of_a_worker {
-            writeln!(f, "{rate:.3} batches/s per worker, {} at work, {:.1} s spent", self.shards_active, self.seconds)?;
-        }
-        if let Some(eta) = self.eta_seconds {
-            let about = if self.goal.is_some() { "at most about" } else { "about" };
-            writeln!(f, "{about} {eta:.0} s left")?;
-        }
-        if let Some(error) = self.relative_error_estimate {
-            writeln!(f, "median relative error so far: {:.3} % (an estimate)", 100.0 * error)?;
-        }
-        if let Some(goal) = &self.goal {
-            writeln!(f, "{goal}")?;
-        }
-        if self.goal.is_some_and(|goal| matches!(goal.verdict, Verdict::ReachedAt(_))) {
-            return self.refused.iter().try_for_each(|line| writeln!(f, "{line}"));
-        }
-        for s in self.shards.iter().filter(|s| s.batches < s.of) {
-            writeln!(
-                f,
-                "shard {}: {} of {} batches, written {} s ago on {}",
-                s.shard, s.batches, s.of, s.age_seconds, s.host
-            )?;
-        }
-        self.refused.iter().try_for_each(|line| writeln!(f, "{line}"))
-    }
+/// Time since `written` \[s\]; 0 where the clock of another machine is ahead.
+fn age(written: u64) -> u64 {
+    now().saturating_sub(written)
 }

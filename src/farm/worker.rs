@@ -3,12 +3,16 @@
 //! The only place that makes a thread pool, and that has a clock that decides when to write. A worker knows neither other
 //! workers nor the final map; two workers on one shard by mistake compute the same batches and do no harm.
 
+mod signals;
+
+use super::attempts::{self, Attempt};
 use super::checkpoint::{self, Reader, Run, Snapshot, read_compaction};
 use super::durable;
 use super::folder::Folder;
 use super::inputs;
 use super::plan::Plan;
 use super::realization::Realization;
+use super::status::now;
 use crate::error::{Error, Result};
 use crate::geometry::simd::Path as Instructions;
 use crate::tally::statistics::{Estimate, median};
@@ -16,10 +20,9 @@ use crate::tally::{SetTally, Tally};
 use nix::sys::prctl;
 use nix::sys::signal::Signal;
 use nix::unistd::{Pid, getppid};
+use signals::Signals;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
 
 /// Bins of a set that the estimate of the error so far looks at, at most.
 const SAMPLED_BINS: usize = 4096;
@@ -46,18 +49,43 @@ pub enum Ended {
     Done,
     /// A signal asked to stop; the batches so far are in the checkpoint.
     Stopped,
+    /// SIGUSR2 said that time is nearly up; the batches so far are in the checkpoint.
+    TimeUp {
+        /// Batches that this process has added.
+        added: u64,
+    },
 }
 
-/// Computes the rest of one shard.
+/// A worker that is about to compute its first batch.
+#[derive(Clone, Debug)]
+pub struct Begun {
+    /// Number of the shard.
+    pub shard: u64,
+    /// Batches of the shard.
+    pub of: u64,
+    /// Number of this attempt, from 1.
+    pub number: u64,
+    /// What is remembered of it.
+    pub attempt: Attempt,
+}
+
+impl std::fmt::Display for Begun {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        let Begun { shard, of, number, attempt: Attempt { host, batches, process, .. } } = self;
+        write!(f, "shard {shard}: attempt {number} on {host}, process {process}, goes on from batch {batches} of {of}")
+    }
+}
+
+/// Computes the rest of one shard; `begun` is told before the first batch.
 ///
 /// # Errors
 /// [`Error::Input`] for a shard that the plan has not; [`Error::Refused`] for a checkpoint that is not this shard's
 /// (it is left as it is); [`Error::Io`].
-pub fn work(order: &Order) -> Result<Ended> {
+pub fn work(order: &Order, begun: &(dyn Fn(&Begun) + Sync)) -> Result<Ended> {
     durable::arm_fault()?;
-    let stop = stop_flag()?;
+    let signals = Signals::catch()?;
     if let Some(parent) = order.parent {
-        die_with(parent, &stop)?;
+        die_with(parent, &signals)?;
     }
     let plan = order.folder.read_plan()?;
     if order.shard >= plan.shard_count() {
@@ -74,25 +102,15 @@ pub fn work(order: &Order) -> Result<Ended> {
     }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(order.threads.unwrap_or(0)).build();
     let pool = pool.map_err(|e| Error::Failed(format!("cannot start threads: {e}")))?;
-    pool.install(|| work.finish(&order.folder, &stop))
-}
-
-/// A flag that SIGTERM and SIGINT set.
-fn stop_flag() -> Result<Arc<AtomicBool>> {
-    let flag = Arc::new(AtomicBool::new(false));
-    for signal in [signal_hook::consts::SIGTERM, signal_hook::consts::SIGINT] {
-        signal_hook::flag::register(signal, Arc::clone(&flag))
-            .map_err(|e| Error::Failed(format!("cannot catch signal {signal}: {e}")))?;
-    }
-    Ok(flag)
+    pool.install(|| work.finish(&order.folder, &signals, begun))
 }
 
 /// Asks the kernel for SIGTERM when `parent` ends, however it ends: no worker outlives its coordinator for long.
-fn die_with(parent: i32, stop: &AtomicBool) -> Result<()> {
+fn die_with(parent: i32, signals: &Signals) -> Result<()> {
     prctl::set_pdeathsig(Signal::SIGTERM).map_err(|e| Error::Failed(format!("prctl: {e}")))?;
     if getppid() != Pid::from_raw(parent) {
         // It ended before the kernel knew our wish.
-        stop.store(true, Ordering::Relaxed);
+        signals.stop();
     }
     Ok(())
 }
@@ -140,17 +158,20 @@ impl<'a> Work<'a> {
         (range.end - range.start).saturating_sub(self.tally.batches())
     }
 
-    fn finish(mut self, folder: &Folder, stop: &AtomicBool) -> Result<Ended> {
+    fn finish(mut self, folder: &Folder, signals: &Signals, begun: &dyn Fn(&Begun)) -> Result<Ended> {
         let scene = inputs::load_scene(folder, self.plan)?;
         let realization = Realization::new(&self.plan.job, &scene, &self.plan.bounds);
         let fixed = realization.fixed_direct();
         self.check_fixed_direct(fixed)?;
         let started = Instant::now();
         let mut schedule = Schedule::new(self.plan.job.run.checkpoint_seconds);
-        let first = self.plan.shard(self.shard).start;
-        while self.missing() > 0 && !stop.load(Ordering::Relaxed) {
-            self.tally.accumulate(&realization.batch(first + self.tally.batches()));
-            if schedule.due(started.elapsed()) && self.missing() > 0 {
+        let range = self.plan.shard(self.shard);
+        let before = self.tally.batches();
+        begun(&self.begin(folder, range.end - range.start)?);
+        while self.missing() > 0 && !signals.asks_to_end() {
+            self.tally.accumulate(&realization.batch(range.start + self.tally.batches()));
+            let due = signals.asks_to_save() || schedule.due(started.elapsed());
+            if due && self.missing() > 0 {
                 self.save(fixed, started.elapsed())?;
                 schedule.written(started.elapsed());
             }
@@ -158,7 +179,19 @@ impl<'a> Work<'a> {
         if self.tally.batches() > self.saved {
             self.save(fixed, started.elapsed())?;
         }
-        Ok(if self.missing() == 0 { Ended::Done } else { Ended::Stopped })
+        Ok(match (self.missing(), signals.time_up()) {
+            (0, _) => Ended::Done,
+            (_, true) => Ended::TimeUp { added: self.tally.batches() - before },
+            (_, false) => Ended::Stopped,
+        })
+    }
+
+    /// Remembers this attempt.
+    fn begin(&self, folder: &Folder, of: u64) -> Result<Begun> {
+        let (started, host) = (now(), host_name());
+        let attempt = Attempt { started, host, process: std::process::id(), batches: self.tally.batches() };
+        let number = attempts::add(folder, self.shard, &attempt)?;
+        Ok(Begun { shard: self.shard, of, number, attempt })
     }
 
     /// Direct light computed here must be that of the checkpoint, bit for bit: it is stored once and added once.
@@ -190,7 +223,7 @@ impl<'a> Work<'a> {
             tally: &self.tally,
             fixed_direct,
             runs: &Run::after(&self.before, here),
-            written: SystemTime::UNIX_EPOCH.elapsed().map_or(0, |d| d.as_secs()),
+            written: now(),
             relative_error: relative_error(&self.tally, fixed_direct),
         };
         checkpoint::write(Path::new(&self.path), &snapshot)?;

@@ -30,10 +30,15 @@ fn a_full_disk_ends_a_worker_and_the_old_checkpoint_stays() {
     let dir = place.plan(&short, "dir");
     expect(0, &mut work(&dir, 0));
     expect(0, lampyris(&["extend", "--batches", "28"]).arg(&dir));
-    let before = Tree::of(&dir);
+    let mut before = Tree::of(&dir);
     let size = fs::metadata(dir.join(checkpoint(0))).unwrap().len();
     let full = limited(size / 512 / 2, &work(&dir, 0));
     refused(&full, 1, &["shard-000000.ckpt", "File too large"]);
+    // That it was tried is remembered, there was room for that; nothing else is new.
+    let attempts = Path::new("attempts/shard-000000.jsonl");
+    let tried = fs::read(dir.join(attempts)).unwrap();
+    let known = before.0.insert(attempts.to_owned(), tried.clone()).unwrap();
+    assert!(tried.starts_with(&known) && tried.len() > known.len());
     before.assert_unchanged(&dir, "a full disk");
     // Results, too, are whole or not there; the plan as well.
     expect(0, &mut work(&dir, 0));
@@ -67,7 +72,7 @@ fn as_nobody(place: &Place, command: &Command) -> Output {
 
 fn allow_writing(dir: &Path, allowed: bool) {
     let mode = if allowed { 0o755 } else { 0o555 };
-    for dir in [dir.join("shards"), dir.to_owned()] {
+    for dir in [dir.join("shards"), dir.join("attempts"), dir.to_owned()] {
         fs::set_permissions(dir, PermissionsExt::from_mode(mode)).unwrap();
     }
 }
@@ -78,9 +83,10 @@ fn a_folder_that_is_read_only_is_read_and_named() {
     let dir = place.path("dir");
     computed().restore(&dir);
     fs::remove_file(dir.join(checkpoint(3))).unwrap();
+    fs::remove_file(dir.join("attempts/shard-000003.jsonl")).unwrap();
     allow_writing(&dir, false);
     let before = Tree::of(&dir);
-    refused(&as_nobody(&place, &work(&dir, 3)), 1, &["shards/.shard-000003.ckpt.lock", "Permission denied"]);
+    refused(&as_nobody(&place, &work(&dir, 3)), 1, &["attempts/shard-000003.jsonl", "Permission denied"]);
     refused(&as_nobody(&place, lampyris(&["merge"]).arg(&dir)), 1, &["dir", "Permission denied"]);
     refused(&as_nobody(&place, lampyris(&["extend", "--batches", "40"]).arg(&dir)), 1, &["Permission denied"]);
     assert_eq!(as_nobody(&place, lampyris(&["status"]).arg(&dir)).status.code(), Some(0));

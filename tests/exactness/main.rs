@@ -12,6 +12,7 @@ mod compacting;
 #[cfg(all(target_arch = "x86_64", target_env = "gnu"))]
 mod cpu;
 mod disk;
+mod engines;
 mod extending;
 mod faults;
 mod kills;

@@ -17,6 +17,7 @@ pub fn lampyris(args: &[&str]) -> Command {
     command.args(args).stdin(Stdio::null());
     command
         .env_remove("SLURM_ARRAY_TASK_ID")
+        .env_remove("SLURM_ARRAY_JOB_ID")
         .env_remove("LAMPYRIS_FAULT")
         .env_remove("GLIBC_TUNABLES")
         .env_remove("LAMPYRIS_SIMD");

@@ -110,6 +110,35 @@ fn one_two_and_five_workers_stop_at_the_same_batch_with_the_bits_of_a_run_planne
 }
 
 #[test]
+fn submissions_go_from_look_to_look_and_end_with_the_goal() {
+    let place = Place::new();
+    let dir = place.plan(&aiming(&place, second(), 45), "dir");
+    let submitted = || {
+        let mut submit = lampyris(&["submit", "--engine", "slurm", "--dry-run"]);
+        let said = expect(0, submit.arg(&dir).env("PATH", ""));
+        said.lines().find(|line| line.contains("sbatch --array=") && !line.starts_with('#')).map(str::to_owned)
+    };
+    let put = |shards: std::ops::Range<u64>| {
+        for shard in shards {
+            fs::create_dir_all(dir.join("shards")).unwrap();
+            fs::write(dir.join(checkpoint(shard)), &limited().tree.0[&checkpoint(shard)]).unwrap();
+        }
+    };
+    let arrays = |said: Option<String>| said.map(|line| line.split(' ').nth(1).unwrap().to_owned());
+    assert_eq!(arrays(submitted()).as_deref(), Some("--array=0-3"), "the first look is at 20 batches");
+    put(0..3);
+    assert_eq!(arrays(submitted()).as_deref(), Some("--array=3"));
+    put(3..4);
+    assert_eq!(arrays(submitted()).as_deref(), Some("--array=4-5"), "not reached: on to the look at 30");
+    put(4..6);
+    assert_eq!(arrays(submitted()), None, "reached");
+    let said = expect(0, lampyris(&["submit", "--engine", "slurm", "--dry-run"]).arg(&dir).env("PATH", ""));
+    assert!(said.starts_with("nothing to submit: every shard is complete"), "{said}");
+    expect(0, lampyris(&["merge"]).arg(&dir));
+    assert_stopped_at_thirty(&dir);
+}
+
+#[test]
 fn kills_change_neither_the_look_nor_a_bit() {
     const HITS: usize = 6;
     let place = Place::new();

@@ -95,22 +95,27 @@ pub fn merge(folders: &[Folder], scratch: &Path) -> Result<(Plan, Merged)> {
 }
 
 /// The number of batches after which the goal of the plan in `folders` has been reached; None when it has not yet.
-/// Reads no batch beyond the last look that can be judged, and beside headers and flux nothing of the sets that the goal
-/// does not ask for.
 ///
 /// # Errors
 /// As [`merge`].
 pub fn goal_reached(folders: &[Folder]) -> Result<Option<u64>> {
+    Ok(looks(folders)?.last().filter(|look| look.reached).map(|look| look.batches))
+}
+
+/// What is seen at every look of the plan in `folders` that can be judged, up to the one at which the goal is reached; none
+/// without a goal. Reads no file that begins beyond the last of them, and beside headers and flux nothing of the sets that the goal
+/// does not ask for.
+///
+/// # Errors
+/// As [`merge`].
+pub fn looks(folders: &[Folder]) -> Result<Vec<Look>> {
     let plan = common_plan(folders)?;
-    let Some(goal) = Goal::of(&plan) else { return Ok(None) };
+    let Some(goal) = Goal::of(&plan) else { return Ok(Vec::new()) };
     let mut chosen = choose(&plan, folders)?;
     let last = plan.last_look(chosen.iter().map(|c| c.range(&plan))).unwrap_or(0);
     chosen.retain(|c| c.range(&plan).start < last);
     let scratch = folders.first().map_or(Path::new("."), |f| f.root());
-    Ok(match fold(&plan, &chosen, goal.sets(), scratch)?.stopped() {
-        Some(Stopped::GoalReached { batches }) => Some(batches),
-        Some(Stopped::Limit) | None => None,
-    })
+    Ok(fold(&plan, &chosen, goal.sets(), scratch)?.result().looks)
 }
 
 /// Folds the sets numbered in `read` file after file, up to the look at which the goal is reached.
