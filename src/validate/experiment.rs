@@ -25,7 +25,8 @@ impl Experiment {
     /// # Errors
     /// [`Error::Input`](crate::error::Error::Input) for what the job or the model gets wrong.
     pub fn new(toml: &str, model: Model) -> Result<Experiment> {
-        let named = if model.triangles.is_empty() && model.replacements.is_empty() { "" } else { "scene = \"in memory\"\n" };
+        let named =
+            if model.triangles.is_empty() && model.replacements.is_empty() { "" } else { "scene = \"in memory\"\n" };
         let job = Job::parse(&format!("{named}{toml}"), "in memory")?;
         let scene = Scene::new(model, &job)?;
         let bounds = bounds(&job, &scene);
