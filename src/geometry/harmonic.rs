@@ -12,9 +12,10 @@
 //! ```
 //!
 //! with M1, M2, M3 the bounds of the derivatives of r along great circles: along a line the angle a has a' = s/|x|,
-//! a'' = -2 s c/|x|^2 (so s^2 M2 + 2 s c M1 bounds what r adds to F''), a''' = -2 (s^3 - 3 s c^2)/|x|^3, s^2 = 1 - c^2, and s^2 c <= 0.385. So where the parabola or the cubic that starts with
-//! these derivatives and falls below F by its bound stays positive there is no surface: steps to its zero pass none, and near a
-//! crossing they converge on it faster than Newton's. From inside -F is taken.
+//! a'' = -2 s c/|x|^2 (so s^2 M2 + 2 s c M1 bounds what r adds to F''), a''' = -2 (s^3 - 3 s c^2)/|x|^3, s^2 = 1 - c^2, and
+//! s^2 c <= 0.385. So where the parabola or the cubic that starts with these derivatives and falls below F by its bound stays
+//! positive there is no surface: steps to its zero pass none, and near a crossing they converge on it faster than Newton's.
+//! From inside -F is taken.
 
 pub(in crate::geometry) mod beside;
 mod bounds;
@@ -42,7 +43,6 @@ use steps::{Taylor, safe_step};
 const ROUNDING: f64 = 1e-14;
 /// Steps after which a line that only grazes the surface counts as meeting it.
 const MAX_STEPS: usize = 4096;
-
 /// How far one look tells that a line is clear, at most, as a share of the distance from the centre.
 const CLEAR: f64 = 0.25;
 

@@ -14,8 +14,8 @@ use crate::math::{DVec2, DVec3, PI, to_world};
 use crate::photometry::Colour;
 use crate::random::{Generator, around_z, cosine_hemisphere, sphere};
 
-/// Tries after which a point is kept whatever its share: one in 10^12 comes so far where a tenth of them is kept.
-const TRIES: usize = 256;
+/// Tries after which a point is kept whatever its share, in units of their mean number: one in e^32 comes so far.
+const TRIES: f64 = 32.0;
 
 /// An emissive star-shaped object.
 #[derive(Clone, Debug)]
@@ -99,8 +99,9 @@ impl Body {
     /// Where a history starts, and its direction.
     pub(super) fn emit(&self, geometry: &Geometry, rng: &mut Generator) -> (DVec3, DVec3) {
         let mut point = self.point(geometry, rng.uniform2());
-        for _ in 0..TRIES {
-            if rng.uniform() * 4.0 * PI * self.most < point.area {
+        let most = 4.0 * PI * self.most;
+        for _ in 0..(TRIES * most / self.area).ceil() as u64 {
+            if rng.uniform() * most < point.area {
                 break;
             }
             point = self.point(geometry, rng.uniform2());

@@ -1,6 +1,6 @@
 //! Direct light of star-shaped objects that emit.
 
-use super::direct::{density_of_response, sample_response};
+use super::direct::{density_of_response, sampled};
 use super::receiver::Receiver;
 use crate::geometry::{Hit, Ray};
 use crate::math::{DVec3, PI};
@@ -13,25 +13,17 @@ pub fn from_bodies(scene: &Scene, receiver: &Receiver, samples: u64, rng: &mut G
     if scene.sources.bodies.is_empty() {
         return Colour::BLACK;
     }
-    let from = scene.geometry.lift(receiver.position, receiver.normal);
-    let mut sum = Colour::BLACK;
-    for k in 0..samples {
-        let stratum = (k as f64 + rng.uniform()) / samples as f64;
-        let (body, probability) = scene.sources.choose_body(stratum);
-        let view = View { scene, body, probability, from };
-        sum += view.sample(receiver, rng);
-        if receiver.response.is_peaked() {
-            let seen = |hit: &Hit, w_in: DVec3| {
-                let (body, probability) = scene.sources.body(hit.primitive)?;
-                let view = View { scene, body, probability, from };
-                let point = body.point_at(&scene.geometry, hit.position);
-                body.lit_side(&point, from)?;
-                Some((body.luminance, view.density(&point, w_in)))
-            };
-            sum += sample_response(scene, receiver, from, rng, seen);
-        }
-    }
-    sum / samples as f64
+    let draw = |from: DVec3, choice: f64, rng: &mut Generator| {
+        let (body, probability) = scene.sources.choose_body(choice);
+        View { scene, body, probability, from }.sample(receiver, rng)
+    };
+    let seen = |from: DVec3, hit: &Hit, w_in: DVec3| {
+        let (body, probability) = scene.sources.body(hit.primitive)?;
+        let point = body.point_at(&scene.geometry, hit.position);
+        body.lit_side(&point, from)?;
+        Some((body.luminance, View { scene, body, probability, from }.density(&point, w_in)))
+    };
+    sampled(scene, receiver, samples, rng, draw, seen)
 }
 
 /// A body seen from a lifted point.

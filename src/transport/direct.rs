@@ -56,24 +56,16 @@ pub fn from_emitters(scene: &Scene, receiver: &Receiver, samples: u64, rng: &mut
     if scene.sources.emitters.is_empty() {
         return Colour::BLACK;
     }
-    // Sampled as seen from the lifted point, where visibility starts: both must agree on which side of an emitter it is.
-    let lifted = scene.geometry.lift(receiver.position, receiver.normal);
-    let mut sum = Colour::BLACK;
-    for k in 0..samples {
-        let stratum = (k as f64 + rng.uniform()) / samples as f64;
-        let (emitter, probability) = scene.sources.choose_emitter(stratum);
-        if let Some(sight) = Sight::new(emitter, probability, lifted) {
-            sum += sample_emitter(scene, receiver, &sight, rng);
-        }
-        if receiver.response.is_peaked() {
-            let seen = |hit: &Hit, w_in: DVec3| {
-                let (emitter, probability) = scene.sources.emitter(hit.primitive)?;
-                Some(Sight::new(emitter, probability, lifted)?.of_hit(hit, w_in))
-            };
-            sum += sample_response(scene, receiver, lifted, rng, seen);
-        }
-    }
-    sum / samples as f64
+    let draw = |from: DVec3, choice: f64, rng: &mut Generator| {
+        let (emitter, probability) = scene.sources.choose_emitter(choice);
+        let sight = Sight::new(emitter, probability, from);
+        sight.map_or(Colour::BLACK, |sight| sample_emitter(scene, receiver, &sight, rng))
+    };
+    let seen = |from: DVec3, hit: &Hit, w_in: DVec3| {
+        let (emitter, probability) = scene.sources.emitter(hit.primitive)?;
+        Some(Sight::new(emitter, probability, from)?.of_hit(hit, w_in))
+    };
+    sampled(scene, receiver, samples, rng, draw, seen)
 }
 
 /// The same of luminaires with extent.
@@ -81,21 +73,37 @@ pub fn from_panels(scene: &Scene, receiver: &Receiver, samples: u64, rng: &mut G
     if scene.sources.panels.is_empty() {
         return Colour::BLACK;
     }
-    let lifted = scene.geometry.lift(receiver.position, receiver.normal);
+    let draw = |from: DVec3, choice: f64, rng: &mut Generator| {
+        let (panel, face, probability) = scene.sources.choose_face(choice);
+        let sight = Sight::new(face, probability, from);
+        sight.map_or(Colour::BLACK, |sight| sample_emitter(scene, receiver, &sight.of(panel), rng))
+    };
+    let seen = |from: DVec3, hit: &Hit, w_in: DVec3| {
+        let (panel, face) = scene.sources.panel_face(hit.primitive)?;
+        let sight = Sight::new(face, scene.sources.face_probability(panel, face), from)?;
+        Some(sight.of(panel).of_hit(hit, w_in))
+    };
+    sampled(scene, receiver, samples, rng, draw, seen)
+}
+
+/// The mean of `samples` draws of light at a receiver. `draw` gets the lifted point, where visibility starts (it and what is drawn must
+/// agree on which side of an emitter that is), and a number in [0, 1) for the choice of the emitter, stratified over the samples;
+/// a peaked response looks as well for those that `seen` knows, see [`sample_response`].
+pub(super) fn sampled(
+    scene: &Scene,
+    receiver: &Receiver,
+    samples: u64,
+    rng: &mut Generator,
+    draw: impl Fn(DVec3, f64, &mut Generator) -> Colour,
+    seen: impl Fn(DVec3, &Hit, DVec3) -> Option<(Colour, f64)>,
+) -> Colour {
+    let from = scene.geometry.lift(receiver.position, receiver.normal);
     let mut sum = Colour::BLACK;
     for k in 0..samples {
-        let stratum = (k as f64 + rng.uniform()) / samples as f64;
-        let (panel, face, probability) = scene.sources.choose_face(stratum);
-        if let Some(sight) = Sight::new(face, probability, lifted) {
-            sum += sample_emitter(scene, receiver, &sight.of(panel), rng);
-        }
+        let choice = (k as f64 + rng.uniform()) / samples as f64;
+        sum += draw(from, choice, rng);
         if receiver.response.is_peaked() {
-            let seen = |hit: &Hit, w_in: DVec3| {
-                let (panel, face) = scene.sources.panel_face(hit.primitive)?;
-                let sight = Sight::new(face, scene.sources.face_probability(panel, face), lifted)?;
-                Some(sight.of(panel).of_hit(hit, w_in))
-            };
-            sum += sample_response(scene, receiver, lifted, rng, seen);
+            sum += sample_response(scene, receiver, from, rng, |hit, w_in| seen(from, hit, w_in));
         }
     }
     sum / samples as f64
@@ -136,7 +144,7 @@ fn sample_emitter(scene: &Scene, receiver: &Receiver, sight: &Sight, rng: &mut G
 
 /// One sample of the light that emitters send where the peaked response looks: those of which `seen` knows, from the hit and the
 /// propagation direction, the luminance and the density with which they are drawn otherwise.
-pub(super) fn sample_response(
+fn sample_response(
     scene: &Scene,
     receiver: &Receiver,
     from: DVec3,

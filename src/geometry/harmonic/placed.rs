@@ -103,9 +103,8 @@ impl Harmonic {
         self.star.contains(self.to_own * (p - self.center))
     }
 
-    /// True for points that may be inside the outer mesh \[m\].
-    fn is_near(&self, p: DVec3) -> bool {
-        let own = self.to_own * (p - self.center);
+    /// True for points, in its own coordinates, that may be inside the outer mesh.
+    fn is_near(&self, own: DVec3) -> bool {
         let length = own.length();
         let (low, high) = self.star.radii();
         let reach = self.shells.as_ref().map_or(f64::INFINITY, |shells| shells.reach);
@@ -119,17 +118,12 @@ impl Harmonic {
     /// Where `p` is \[m\], with its cone where that is asked for.
     pub(in crate::geometry) fn beside(&self, p: DVec3, with_cone: bool) -> Beside {
         let own = self.to_own * (p - self.center);
-        let length = own.length();
-        let (low, high) = self.star.radii();
+        let (length, near) = (own.length(), self.is_near(own));
+        if !near || length < self.star.bounds.low {
+            return Beside { inside: near, near, free: None, bend: None };
+        }
         let reach = self.shells.as_ref().map_or(f64::INFINITY, |shells| shells.reach);
-        if length < low || length >= high * reach {
-            return Beside { inside: length < low, near: length < low, free: None, bend: None };
-        }
         let n = own / length;
-        let (value, error) = self.star.samples.value(n);
-        if length > (value + error) * reach {
-            return Beside { inside: false, near: false, free: None, bend: None };
-        }
         let bend = self.star.series.bend(n);
         let (inside, near) = (length < bend.value, length < bend.value * reach);
         let horizon = self.shells.as_ref().and_then(|shells| shells.horizon.as_ref());
@@ -257,8 +251,8 @@ impl Harmonic {
 
     /// The first point of the surface along `ray`, at most `limit` away \[m\].
     pub(in crate::geometry) fn hit(&self, ray: &Ray, limit: f64) -> Option<Hit> {
-        let Line { crossing, before, scale } =
-            self.first_within(ray, 0.0..limit, self.is_near(ray.origin), limit < f64::INFINITY)?;
+        let near = self.is_near(self.to_own * (ray.origin - self.center));
+        let Line { crossing, before, scale } = self.first_within(ray, 0.0..limit, near, limit < f64::INFINITY)?;
         let normal = (self.to_own.transpose() * crossing.normal).normalize();
         let position = self.center + self.to_world * crossing.position;
         Some(hit(ray, before + crossing.distance / scale, position, normal))
