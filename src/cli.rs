@@ -89,6 +89,9 @@ pub enum Command {
         /// Folder of the results [default: the first DIR].
         #[arg(short, long, value_name = "OUT")]
         output: Option<PathBuf>,
+        /// Look again for so long while checkpoints are missing or read short: network file systems show some late.
+        #[arg(long, value_name = "SECONDS", default_value = "0", value_parser = clap::value_parser!(u64).range(..=86_400))]
+        wait: u64,
     },
     /// Compute on many machines: by Slurm, or by ssh with GNU parallel; the same command again submits what is missing.
     #[command(after_help = "Examples:\n  lampyris submit jobs/room.toml -o out/room --engine slurm --time 1:00:00\n  \

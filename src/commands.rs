@@ -13,6 +13,7 @@ use lampyris::farm::folder::{Folder, plan_text};
 use lampyris::farm::inputs::{Prepared, prepare};
 use lampyris::farm::merge::compact::Compacted;
 use lampyris::farm::merge::goal::Look;
+use lampyris::farm::merge::settle::wait_until_whole;
 use lampyris::farm::merge::{self, goal_reached, looks};
 use lampyris::farm::plan::{Plan, human};
 use lampyris::farm::status::{Seen, Status, now, status};
@@ -65,7 +66,10 @@ pub fn execute(command: Command) -> Result<Outcome> {
         Command::Work { dir, shard, threads, parent } => work(&dir, shard, threads, parent),
         Command::Status { dir, watch: true, .. } => watch::watch(&Folder::new(&dir)),
         Command::Status { dir, json, .. } => show_status(&dir, json),
-        Command::Merge { dirs, output } => merge_and_report(&dirs, output),
+        Command::Merge { dirs, output, wait } => {
+            wait_until_whole(&folders(&dirs), wait);
+            merge_and_report(&dirs, output)
+        }
         Command::Submit(request) => submit::submit(request),
         Command::Extend { dir, batches } => extend(&dir, batches),
         Command::Compact { dir } => compact(&dir),
@@ -211,8 +215,12 @@ fn looks_cheap(folder: &Folder, status: &Status, most: u64) -> Result<bool> {
     Ok(plan.sizes().checkpoint.saturating_mul(shards) <= most)
 }
 
+fn folders(dirs: &[PathBuf]) -> Vec<Folder> {
+    dirs.iter().map(|dir| Folder::new(dir)).collect()
+}
+
 fn merge_and_report(dirs: &[PathBuf], output: Option<PathBuf>) -> Result<Outcome> {
-    let folders: Vec<Folder> = dirs.iter().map(|d| Folder::new(d)).collect();
+    let folders = folders(dirs);
     let output = output.unwrap_or_else(|| dirs[0].clone());
     std::fs::create_dir_all(&output).map_err(Error::io(&output))?;
     let (plan, merged) = merge::merge(&folders, &output)?;

@@ -1,8 +1,9 @@
 //! Durable replace: write beside, sync, rename, sync the folder. Nobody else renames.
 //!
 //! Whoever replaces a checkpoint holds a lock beside it from the first byte to the last sync, so a temporary file found
-//! under the lock belongs to a process that died: it is removed. On file systems without locks leftovers stay, and
-//! are harmless because nobody reads them. A reader sees the old file or the new one, whole.
+//! under the lock belongs to a process that died: it is removed. On file systems without locks, or where a frozen process
+//! keeps the lock for half a minute, leftovers stay, and are harmless because nobody reads them. A reader sees the old file
+//! or the new one, whole.
 //!
 //! Tests stop a process inside a replacement: once [`arm_fault`] has been called, the environment variable
 //! `LAMPYRIS_FAULT=<step>:<count>` kills the process with SIGKILL at the named [`Step`] of its `<count>`-th
@@ -11,15 +12,20 @@
 use crate::error::{Error, Result};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
-use std::fs::{File, OpenOptions, Permissions};
+use std::fs::{File, OpenOptions, Permissions, TryLockError};
 use std::io::{self, BufWriter, ErrorKind, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
 
 /// Suffix of files being written.
 const TEMPORARY: &str = ".tmp";
+/// A replacement takes seconds; who holds a lock for longer is frozen, as on a node that was cut off.
+const PATIENCE: Duration = Duration::from_secs(30);
+/// Time between two tries for a lock.
+const BETWEEN_TRIES: Duration = Duration::from_millis(10);
 
 /// The moments of a replacement at which a process can be made to die.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -109,7 +115,7 @@ pub fn replace_if(
     write: impl FnOnce(&mut Beside) -> io::Result<()>,
     allowed: impl FnOnce() -> Result<bool>,
 ) -> Result<bool> {
-    let lock = lock_beside(path)?;
+    let lock = lock_beside(path, PATIENCE)?;
     if lock.is_some() {
         remove_leftovers(path);
     }
@@ -194,12 +200,20 @@ pub fn lock_path(path: &Path) -> PathBuf {
     path.with_file_name(beside(path, ".lock"))
 }
 
-/// The lock beside `path`, released when dropped or when the process dies; None where there are no locks.
-fn lock_beside(path: &Path) -> Result<Option<File>> {
+/// The lock beside `path`, released when dropped or when the process dies; None where there are no locks, or where somebody
+/// keeps it beyond `patience`.
+fn lock_beside(path: &Path, patience: Duration) -> Result<Option<File>> {
     let lock = lock_path(path);
     let opened = OpenOptions::new().create(true).truncate(false).write(true).open(&lock);
     let file = opened.map_err(Error::io(&lock))?;
-    Ok(file.lock().is_ok().then_some(file))
+    let begun = Instant::now();
+    loop {
+        match file.try_lock() {
+            Ok(()) => return Ok(Some(file)),
+            Err(TryLockError::WouldBlock) if begun.elapsed() < patience => std::thread::sleep(BETWEEN_TRIES),
+            Err(_) => return Ok(None),
+        }
+    }
 }
 
 fn remove_leftovers(path: &Path) {
@@ -237,5 +251,20 @@ mod tests {
         assert_eq!(std::fs::read(&path).unwrap(), b"one");
         let names: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
         assert_eq!(names.len(), 3, "{names:?}");
+    }
+
+    #[test]
+    fn a_lock_is_waited_for_but_not_for_ever() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.ckpt");
+        let held = lock_beside(&path, PATIENCE).unwrap().unwrap();
+        assert!(lock_beside(&path, Duration::from_millis(30)).unwrap().is_none());
+        std::thread::scope(|scope| {
+            let waiting = scope.spawn(|| lock_beside(&path, PATIENCE).unwrap().is_some());
+            std::thread::sleep(Duration::from_millis(30));
+            assert!(!waiting.is_finished());
+            drop(held);
+            assert!(waiting.join().unwrap());
+        });
     }
 }

@@ -16,6 +16,7 @@ mod engines;
 mod extending;
 mod faults;
 mod kills;
+mod late;
 mod merging;
 mod place;
 mod process;

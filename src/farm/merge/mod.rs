@@ -19,6 +19,7 @@ pub mod compact;
 mod fold;
 pub mod goal;
 mod passes;
+pub mod settle;
 
 pub use blocks::Blocks;
 

@@ -6,6 +6,8 @@ use crate::farm::plan::Plan;
 
 /// What a process takes beside what the plan counts \[bytes\].
 const MARGIN: u64 = 256 << 20;
+/// The merge waits so long for files that it does not see yet \[s\]: NFS forgets what it remembers after 60 s at most.
+const LATE: u64 = 90;
 
 /// A batch script and where it belongs.
 #[derive(Clone, Debug)]
@@ -48,7 +50,8 @@ pub(super) fn merge(root: &str, program: &str, plan: &Plan, time: TimeLimit, ext
 # Written by `lampyris submit`. Exit code 3: shards are missing, and the log says which and how to go on.
 #   sbatch --dependency=afterany:<job of the shards> {script}
 {head}
-exec {program} merge {folder}
+# What other nodes have written a network file system may show a minute late.
+exec {program} merge {folder} --wait {LATE}
 ",
         script = quoted(&path),
         folder = quoted(root),
@@ -106,6 +109,6 @@ mod tests {
             assert!(lines.contains(&line), "{line}\n{}", script.text);
         }
         let merge = merge("/data/a b", "lampyris", &plan(), time, &extra);
-        assert!(merge.text.ends_with("exec lampyris merge '/data/a b'\n") && !merge.text.contains("signal"));
+        assert!(merge.text.ends_with("exec lampyris merge '/data/a b' --wait 90\n") && !merge.text.contains("signal"));
     }
 }

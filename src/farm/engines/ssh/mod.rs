@@ -16,6 +16,7 @@ pub mod hosts;
 use super::missing::{Missing, list};
 use super::{not_started, quoted, script_path, this_program};
 use crate::error::{Error, Result};
+use crate::farm::checkpoint::read_header;
 use crate::farm::durable;
 use crate::farm::folder::Folder;
 use crate::farm::plan::Plan;
@@ -38,6 +39,8 @@ const HINT: &str = "--engine ssh needs GNU parallel (package parallel)";
 const POLL: Duration = Duration::from_millis(200);
 /// Time between two visits to the copies, at least.
 const VISIT: Duration = Duration::from_secs(5);
+/// What hosts have written into the folder may be seen here so much later: NFS forgets what it remembers after 60 s at most.
+const LATE: Duration = Duration::from_secs(90);
 /// A worker whose connection ends has this long to write its checkpoint \[ms\].
 const GRACE: &str = "TERM,10000,KILL,25";
 /// Of the log this much is shown when a round was in vain \[bytes\].
@@ -90,7 +93,10 @@ pub fn run(
             return Err(Error::Failed(format!("no host has computed a batch; {}", run.last_words())));
         }
         before = batches;
-        run.round(ready, &shards, &stop)?;
+        let copies = ready.iter().any(|(_, host)| host.folder.is_some());
+        if run.round(ready, &shards, &stop)? && !copies {
+            run.wait_for(&shards);
+        }
     }
 }
 
@@ -113,8 +119,8 @@ impl Run<'_> {
         (1..).zip(self.hosts).filter(|(_, host)| ready(host)).collect()
     }
 
-    /// Gives `shards` to hosts.
-    fn round(&self, ready: Vec<(usize, &Host)>, shards: &[u64], stop: &AtomicBool) -> Result<()> {
+    /// Gives `shards` to hosts; true when every worker said that its shard is done.
+    fn round(&self, ready: Vec<(usize, &Host)>, shards: &[u64], stop: &AtomicBool) -> Result<bool> {
         let said = |host: &Host, e: &Error| (self.say)(&format!("{} is left out: {e}\n", host.short_name()));
         let send = |host: &Host| copies::send(host, self.folder, &self.root, &self.program, shards);
         let sent = |host: &Host| send(host).inspect_err(|e| said(host, e)).is_ok();
@@ -167,14 +173,30 @@ impl Run<'_> {
         format!("sh -c {} shard {{}}", quoted(&script))
     }
 
-    /// Until it ends or a signal asks to stop, visiting the copies now and then.
-    fn watch(&self, parallel: &mut Child, hosts: &[(usize, &Host)], stop: &AtomicBool) -> Result<()> {
+    /// Looks again while `shards`, which are done, are not seen to be: the folder may be shown late.
+    fn wait_for(&self, shards: &[u64]) {
+        let begun = Instant::now();
+        let is_done = |k: u64| {
+            let header = read_header(&self.folder.shard_path(k), self.plan, k);
+            let range = self.plan.shard(k);
+            header.is_ok_and(|header| header.is_some_and(|header| header.batches() >= range.end - range.start))
+        };
+        while begun.elapsed() < LATE && !shards.iter().all(|&k| is_done(k)) {
+            std::thread::sleep(POLL);
+        }
+    }
+
+    /// Until it ends or a signal asks to stop, visiting the copies now and then; true when every worker ended well.
+    fn watch(&self, parallel: &mut Child, hosts: &[(usize, &Host)], stop: &AtomicBool) -> Result<bool> {
         let has_copies = hosts.iter().any(|(_, host)| host.folder.is_some());
         let pause = VISIT.max(Duration::from_secs_f64(self.plan.job.run.checkpoint_seconds));
         let mut visited = Instant::now();
-        while parallel.try_wait().map_err(|e| Error::Failed(format!("parallel: {e}")))?.is_none() {
+        loop {
+            if let Some(status) = parallel.try_wait().map_err(|e| Error::Failed(format!("parallel: {e}")))? {
+                return Ok(status.success());
+            }
             if stop.load(Ordering::Relaxed) {
-                return end(parallel);
+                return end(parallel).map(|()| false);
             }
             std::thread::sleep(POLL);
             if has_copies && visited.elapsed() > pause {
@@ -182,7 +204,6 @@ impl Run<'_> {
                 visited = Instant::now();
             }
         }
-        Ok(())
     }
 
     /// Takes over what `hosts` have done on their copies. One that cannot be reached may have died: it is said of the
