@@ -8,10 +8,13 @@ use common::scenes::{
     spot_camera,
 };
 use common::{Case, Comparison, Estimate, assert_all, compare, difference};
+use lampyris::geometry::visibility::Scratch;
 use lampyris::math::{DVec3, PI, atan2};
 use lampyris::photometry::Colour;
 use lampyris::scene::{Light, Model, Reflectance, Surface};
 use lampyris::tally::BatchScores;
+use lampyris::transport::neighbours::Neighbours;
+use lampyris::transport::receiver::{Receiver, Response};
 use std::ops::Range;
 
 const ALL: Range<u32> = 0..u32::MAX;
@@ -251,6 +254,55 @@ fn light_that_comes_over_mirrors_is_neither_lost_nor_counted_twice() {
         compare(format!("receiver {set}"), difference.shifted(reference), reference)
     };
     assert_all(&(0..4).map(compared).collect::<Vec<_>>());
+}
+
+/// A lux-meter of the unit cube, in re-centred coordinates.
+fn meter(position: [f64; 3], normal: DVec3) -> Receiver {
+    Receiver { position: DVec3::from(position) - 0.5, normal, response: Response::Cosine }
+}
+
+#[test]
+fn a_point_found_by_one_receiver_counts_at_all_that_see_it_as_near() {
+    let job = run(64, 16) + &meters_at_the_edge();
+    let case = Case::new(&job, closed_box(DVec3::ONE, &lambert(0.5, 1.0 / PI)));
+    let y = meter([0.0, 0.1, 0.4], DVec3::X);
+    let floor = |x: f64, z: f64| meter([x, 0.0, z], DVec3::Y);
+    // Below the floor, and farther away than the bound reaches.
+    let others = [meter([0.1, 0.0, 0.4], DVec3::NEG_Y), floor(0.9, 0.9)];
+    let near = [floor(0.1, 0.4), floor(0.02, 0.45), floor(0.2, 0.3)];
+    let bound = 1.0;
+    let factor = |r: &Receiver| {
+        let way = y.position - r.position;
+        way.dot(r.normal) * -way.dot(y.normal) / (way.length_squared() * way.length_squared())
+    };
+    let weights = |receivers: &[Receiver]| {
+        let neighbours = Neighbours::new(&case.scene, receivers.iter(), bound);
+        neighbours.weights(&case.scene, &y, 0, &mut Scratch::default()).map(|w| w.luminance())
+    };
+    let close = |a: f64, b: f64| (a - b).abs() < 1e-12 * b;
+    let alone = weights(&near[..1]);
+    assert!(close(alone[0], PI * (1.0 - bound / factor(&near[0]))), "{alone:?}");
+    let all = weights(&[&near[..], &others].concat());
+    let density: f64 = near.iter().map(factor).sum();
+    for (weight, receiver) in all.iter().zip(&near) {
+        assert!(factor(receiver) > bound && close(*weight, PI * (factor(receiver) - bound) / density), "{all:?}");
+    }
+    assert!(all[3..].iter().all(|&w| w == 0.0), "{all:?}");
+}
+
+#[test]
+fn many_neighbours_beside_a_wall_have_the_means_of_reverse_paths() {
+    let grid = "[[grid]]\nname = \"strip\"\norigin = [0.001, 0.0, 0.3]\nu = [0.1, 0.0, 0.0]\nv = [0.0, 0.0, 0.3]\n\
+                normal = [0.0, 1.0, 0.0]\ncolumns = 8\nrows = 8\n";
+    let model = closed_box(DVec3::ONE, &lambert(0.6, 1.0 / PI));
+    let of_grid = |job: &str| {
+        let (_, batches) = Case::new(job, model.clone()).batches(ALL);
+        let bin = |i: usize| Estimate::from_scores(batches.iter().map(|b| b.sets[0].value[i]));
+        [0, 3, 7, 36, 63].map(bin)
+    };
+    let local = of_grid(&(run(1024, 64) + grid));
+    let reverse = of_grid(&(run(1024, 64) + grid + "[transport]\nestimator = \"reverse\"\n"));
+    assert_all(&differences("bin", &local, &reverse));
 }
 
 #[test]

@@ -26,7 +26,7 @@ const SOBOLEV_A_1: f64 = 0.653442317194389;
 /// All cases, printed as they come.
 pub fn run(replicates: u64, mut done: impl FnMut(&[Counted])) -> Result<Vec<Counted>> {
     type Case = fn(u64) -> Result<Vec<Counted>>;
-    let cases: [Case; 20] = [
+    let cases: [Case; 21] = [
         |n| sobolev_a("rqmc", n),
         |n| sobolev_a("random", n),
         ulbricht_sphere,
@@ -36,6 +36,7 @@ pub fn run(replicates: u64, mut done: impl FnMut(&[Counted])) -> Result<Vec<Coun
         |n| lamp_in_cube("rqmc", 16, 32, false, n),
         |n| lamp_in_cube("random", 64, 32, false, n),
         furnace_grid,
+        furnace_neighbours,
         cornell,
         |n| glossy_floor(0.1, Lamp::Ceiling, 32, n),
         |n| glossy_floor(0.1, Lamp::Point, 32, n),
@@ -186,6 +187,28 @@ fn furnace_grid(n: u64) -> Result<Vec<Counted>> {
         together,
     ];
     Ok(count("furnace, rqmc", &experiment, quantities, n))
+}
+
+/// The same for a grid whose points are near a wall, and so many that they share what they find there.
+fn furnace_neighbours(n: u64) -> Result<Vec<Counted>> {
+    let grid = "[[grid]]\nname = \"grid\"\norigin = [0.0, 0.0, 0.3]\nu = [0.08, 0.0, 0.0]\nv = [0.0, 0.0, 0.2]\n\
+                normal = [0.0, 1.0, 0.0]\ncolumns = 8\nrows = 8\n";
+    let job = tables("rqmc", 32, 32) + grid;
+    let experiment = Experiment::new(&job, closed_box(DVec3::ONE, &lambert(0.5, 1.0 / PI)))?;
+    let together = Quantity {
+        name: "all 64 points at once".into(),
+        kind: Kind::Together(0),
+        truth: vec![2.0; 64],
+        truth_error: 0.0,
+    };
+    let quantities = vec![
+        exact("5 mm from the wall", Kind::Total(0, 0), 2.0),
+        exact("75 mm from the wall", Kind::Total(0, 7), 2.0),
+        exact("mean of 64 equal points", Kind::Mean(0), 2.0),
+        exact("Uo of 64 equal points", Kind::Uniformity(0), 1.0),
+        together,
+    ];
+    Ok(count("furnace beside a wall, neighbours, rqmc", &experiment, quantities, n))
 }
 
 /// The Cornell box with its panel.

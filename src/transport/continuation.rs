@@ -46,6 +46,8 @@ pub struct Continuation {
     /// matt \[lx or cd/m2\]. What they really reflect of it has this order of magnitude and comes in spikes: no
     /// direction can be drawn towards such a source, so that its image in a narrow lobe is met by chance alone.
     pub caustic: f64,
+    /// True where y_1 and the receiver are matt: y_1 then counts in full, as [`super::neighbours`] wants it.
+    pub shared: bool,
 }
 
 /// True when connections may leave something of the light that arrives at `receiver`: a continuation is due.
@@ -61,29 +63,33 @@ pub fn is_due(scene: &Scene, receiver: &Receiver, bound: f64) -> bool {
 /// Draws a path from `receiver`.
 pub fn continue_from(scene: &Scene, receiver: &Receiver, bound: f64, rng: &mut Generator) -> Continuation {
     let mut path = Continuation::default();
-    let mut at = *receiver;
-    let mut first = None;
+    let Some((mut weight, mut found)) = step(scene, receiver, bound, rng) else { return path };
+    path.shared = receiver.response.constant(scene).is_some() && found.is_matt(scene);
+    if path.shared {
+        (weight, found.carried) = (Colour::WHITE, 0.0);
+    }
+    let first = weight.luminance();
     for _ in 0..MAX_POINTS {
-        let Some((mut weight, found)) = step(scene, &at, bound, rng) else { break };
-        let size = weight.luminance();
-        let survival = size / (ROULETTE_BELOW * *first.get_or_insert(size));
+        let next = found.receiver(scene, weight);
+        if next.response.is_peaked() {
+            path.caustic += from_lights_as_if_matt(scene, &next).luminance();
+        }
+        path.points.push(next);
+        let Some(further) = step(scene, &next, bound, rng) else { break };
+        (weight, found) = further;
+        let survival = weight.luminance() / (ROULETTE_BELOW * first);
         if survival < 1.0 {
             if !rng.chance(survival) {
                 break;
             }
             weight = weight / survival;
         }
-        let next = found.receiver(scene, weight);
-        if next.response.is_peaked() {
-            path.caustic += from_lights_as_if_matt(scene, &next).luminance();
-        }
-        path.points.push(next);
-        at = next;
     }
     path
 }
 
 /// A surface point found by a step.
+#[derive(Clone, Copy)]
 struct Found {
     hit: Hit,
     /// From the surface back to where the step began.
@@ -93,6 +99,10 @@ struct Found {
 }
 
 impl Found {
+    fn is_matt(&self, scene: &Scene) -> bool {
+        scene.surface(self.hit.primitive).reflectance.lambert().is_some()
+    }
+
     /// The receiver of light that is reflected here and then counts with `weight`.
     fn receiver(self, scene: &Scene, weight: Colour) -> Receiver {
         let Found { hit, back, carried } = self;
