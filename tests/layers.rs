@@ -228,7 +228,7 @@ fn strays(words: &[&str], allowed: &[&str]) -> Vec<String> {
 #[test]
 fn threads_are_where_batches_are_computed_or_merged_and_in_the_loading_of_a_scene() {
     let allowed = [
-        "farm/local.rs",
+        "farm/local",
         "farm/realization.rs",
         "farm/thinning.rs",
         "farm/worker.rs",
