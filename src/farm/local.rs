@@ -15,12 +15,14 @@ use crate::tally::{Scores, Watched};
 use crate::transport::connection::{Connected, Connectors, Link, Rule, TILE, Tile, connect};
 use crate::transport::continuation::{Continuation, continue_from, is_due};
 use crate::transport::receiver::Receiver;
-use crate::transport::shared::{Shared, direct_light};
+use crate::transport::shared::{LitPoints, Shared, direct_light};
 use rayon::prelude::*;
 use std::ops::Range;
 
 /// Histories that share a continuation of each receiver: chosen by measured figure of merit (docs/benchmarks.md).
 const HISTORIES_OF_A_PATH: usize = 4;
+/// Lights without extent that the points of continuations ask, where there are more: chosen by measured figure of merit.
+const LAMPS_OF_A_POINT: u64 = 8;
 /// Bins that are scored together.
 const BLOCK: usize = 64 * TILE;
 
@@ -52,7 +54,7 @@ struct Block<'a> {
     scene: &'a Scene,
     histories: &'a Connectors,
     /// Points of emitters, for each position in a bin.
-    shared: &'a [Connectors],
+    shared: &'a [LitPoints],
     rule: &'a Rule,
     bins: &'a [u32],
     batch: u64,
@@ -144,12 +146,12 @@ impl Block<'_> {
     }
 
     /// The links of the points of continuations, with the direct light there.
-    fn light_points(&self, points: Vec<Point>, depth: u32, lit: &Connectors, group: usize) -> Vec<Link> {
+    fn light_points(&self, points: Vec<Point>, depth: u32, lit: &LitPoints, group: usize) -> Vec<Link> {
         let counts = self.rule.orders.contains(&depth);
         let of_tile = |points: &mut [Point]| -> Vec<Link> {
             let mut there: Vec<_> = points.iter_mut().map(|(_, receiver, rng)| (*receiver, rng)).collect();
-            let what = (true, self.rule.channels);
-            let light = direct_light(self.scene, &mut there, Shared::run(lit, group), 1, what);
+            let what = (LAMPS_OF_A_POINT, self.rule.channels);
+            let light = direct_light(self.scene, &mut there, &Shared::run(lit, group), 1, what);
             let link = |((owner, receiver, _), light): (&Point, Colour)| {
                 self.link(*owner, *receiver, if counts { light } else { Colour::BLACK })
             };

@@ -75,7 +75,7 @@ pub fn continue_from(scene: &Scene, receiver: &Receiver, bound: f64, rng: &mut G
         }
         let next = found.receiver(scene, weight);
         if next.response.is_peaked() {
-            path.caustic += from_lights_as_if_matt(scene, &next).luminance();
+            path.caustic += from_lights_as_if_matt(scene, &next, rng).luminance();
         }
         path.points.push(next);
         at = next;
