@@ -11,6 +11,7 @@ pub mod gltf;
 mod groups;
 mod light;
 mod luminaires;
+mod luminous_mesh;
 mod nodes;
 mod panel;
 pub mod photometric_web;

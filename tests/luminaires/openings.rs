@@ -9,7 +9,7 @@ use lampyris::scene::Scene;
 use lampyris::transport::direct::from_panels;
 use lampyris::transport::receiver::{Receiver, Response, look};
 
-const SHAPES: [&str; 7] =
+pub const SHAPES: [&str; 7] =
     ["rectangle", "disc", "box", "cylinder_upright", "cylinder_along_c0", "cylinder_across_c0", "sphere"];
 
 fn random(name: &str) -> Generator {
@@ -63,7 +63,7 @@ fn a_lambertian_disc_is_exact_near_by_and_a_point_far_off() {
 }
 
 /// Area of a shape of the test files as seen along `w`, given in the axes length, width, aim \[m2\].
-fn shown(shape: &str, [x, y, z]: [f64; 3]) -> f64 {
+pub fn shown(shape: &str, [x, y, z]: [f64; 3]) -> f64 {
     let across = |a: f64, b: f64| (a * a + b * b).sqrt();
     match shape {
         "rectangle" => 0.6 * 0.3 * z.abs(),

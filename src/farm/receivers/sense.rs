@@ -20,7 +20,7 @@ use crate::transport::shared::{LitPoints, Shared, TOGETHER, direct_light};
 const HISTORIES_OF_A_POINT: u64 = 2;
 /// Histories of a batch for each of many lights without extent that the positions of a bin ask together, and the least
 /// number that one position asks: chosen in the same way.
-const HISTORIES_OF_A_LAMP: u64 = 4;
+const HISTORIES_OF_A_LAMP: u64 = 1;
 const LEAST_LAMPS: u64 = 4;
 
 /// What the positions of one bin say in one batch.
