@@ -1,5 +1,5 @@
 //! Many luminaires of the same flux together in a hall with columns, one thread:
-//! `cargo bench --bench many_lights -- [point|opening|emissive|outside ...] [--lights N ...]`. Prints markdown tables.
+//! `cargo bench --bench many_lights -- [point|opening|emissive|outside ...] [grid|picture] [N ...]`. Prints markdown tables.
 //!
 //! For a grid and a picture: time before the first batch, time of a history and bin, relative error, and figure of merit as in
 //! `merit`, also against that of the first number of lights. Medians of three seeds. `outside` is `point` with seven times the
@@ -35,8 +35,10 @@ const CAMERA: &str = "[run]\nhistories_per_batch = 256\nbatches = 16\n[[camera]]
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
     let numbers: Vec<u32> = arguments.iter().filter_map(|a| a.parse().ok()).collect();
-    let kinds: Vec<&str> =
-        arguments.iter().map(String::as_str).filter(|a| a.parse::<u32>().is_err() && *a != "--lights").collect();
+    let named = |names: &[&'static str]| -> Vec<&'static str> {
+        names.iter().copied().filter(|name| arguments.iter().any(|a| a == name)).collect()
+    };
+    let (kinds, receivers) = (named(&["point", "opening", "emissive", "outside"]), named(&["grid", "picture"]));
     let numbers = if numbers.is_empty() { vec![10, 100, 1000] } else { numbers };
     let kinds = if kinds.is_empty() { vec!["point", "opening", "emissive"] } else { kinds };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread");
@@ -46,6 +48,9 @@ fn main() {
     println!("|---|---|---|---|---|---|---|---|");
     for kind in kinds {
         for (what, job) in [("grid", GRID), ("picture", CAMERA)] {
+            if !receivers.is_empty() && !receivers.contains(&what) {
+                continue;
+            }
             let mut first = None;
             for &number in &numbers {
                 let runs: Vec<[f64; 5]> =

@@ -95,10 +95,10 @@ fn floor() -> Model {
 fn asymmetric_web() -> Result<Vec<Comparison>> {
     // 3 m below, in every plane at every other angle; and half way between two planes and two angles.
     let mut asked: Vec<(String, f64, f64, f64)> = Vec::new();
-    for plane in 0..4 {
+    for (plane, c) in PLANES.into_iter().enumerate().take(4) {
         for angle in [0, 2, 3, 4] {
-            let name = format!("C {}, gamma {}", PLANES[plane], ANGLES[angle]);
-            asked.push((name, PLANES[plane], ANGLES[angle], intensity(plane, angle)));
+            let name = format!("C {c}, gamma {}", ANGLES[angle]);
+            asked.push((name, c, ANGLES[angle], intensity(plane, angle)));
         }
     }
     let corners = [(3, 2), (3, 3), (4, 2), (4, 3)];

@@ -27,10 +27,17 @@ pub(super) fn cases() -> Vec<Case> {
             "opening/area-through-roof",
             "a luminous area above the same hole",
             "Lambert's sum over the edges of what is seen through it",
-            || area_through(&roof(), [DVec3::new(-1.5, 5.0, -1.0), DVec3::X * 3.0, DVec3::Z * 2.0], &hole_in_roof()),
+            || {
+                area_through(
+                    &roof(),
+                    [DVec3::new(-1.5, 5.0, -1.0), DVec3::X * 3.0, DVec3::Z * 2.0],
+                    &hole_in_roof(),
+                    4096,
+                )
+            },
         ),
         THEME.case("opening/area-through-facade", "a bright facade opposite a window", "the same", || {
-            area_through(&facade(), [DVec3::new(8.0, -2.0, 6.0), DVec3::Y * 9.0, DVec3::Z * -12.0], &window())
+            area_through(&facade(), [DVec3::new(8.0, -2.0, 6.0), DVec3::Y * 9.0, DVec3::Z * -12.0], &window(), 32768)
         }),
         THEME.case(
             "reflection/without-obstruction",
@@ -109,7 +116,12 @@ fn point_through_roof() -> Result<Vec<Comparison>> {
 }
 
 /// A luminous rectangle (origin, u, v) behind a wall with a hole: on the floor, and on a vertical meter.
-fn area_through(wall: &Model, [origin, u, v]: [DVec3; 3], hole: &[DVec3; 4]) -> Result<Vec<Comparison>> {
+fn area_through(
+    wall: &Model,
+    [origin, u, v]: [DVec3; 3],
+    hole: &[DVec3; 4],
+    histories: u32,
+) -> Result<Vec<Comparison>> {
     let mut model = wall.clone();
     add_quad(&mut model, origin, u, v, lambert(0.0, 1000.0));
     let places = [
@@ -119,7 +131,7 @@ fn area_through(wall: &Model, [origin, u, v]: [DVec3; 3], hole: &[DVec3; 4]) -> 
         ([-0.7, 0.5, 0.0], [1.0, 0.0, 0.0]),
         ([-1.0, 0.8, -0.3], [0.6, 0.8, 0.0]),
     ];
-    let job = run(65536, 32) + &points("p", places);
+    let job = run(histories, 32) + &points("p", places);
     let found = Experiment::new(&job, model)?.values();
     let corners = rectangle(origin, u, v);
     let exact = |(place, normal): ([f64; 3], [f64; 3])| {

@@ -24,7 +24,7 @@ fn askew(file: &str) -> Scene {
 }
 
 /// Mean of `samples` estimates of the illuminance, and the standard error of the mean \[lx\].
-fn sampled(samples: u32, mut estimate: impl FnMut() -> f64) -> (f64, f64) {
+pub fn sampled(samples: u32, mut estimate: impl FnMut() -> f64) -> (f64, f64) {
     let scores: Vec<f64> = (0..samples).map(|_| estimate()).collect();
     let n = f64::from(samples);
     let mean = scores.iter().sum::<f64>() / n;
