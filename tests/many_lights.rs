@@ -59,12 +59,13 @@ fn light(i: u32, count: u32) -> Light {
     }
 }
 
-/// The hall with `count` lights, parallel light through its ceiling shut out, and two columns.
+/// The hall with `count` lights, parallel light through its ceiling shut out, and two screens.
 fn hall(count: u32, reflectance: f64) -> Model {
     let mut model = closed_box(HALL, &lambert(reflectance, 0.0));
     for x in [4.0, 8.0] {
-        add_quad(&mut model, DVec3::new(x, 0.0, 3.0), DVec3::Y * 3.0, DVec3::Z, lambert(reflectance, 0.0));
-        add_quad(&mut model, DVec3::new(x, 0.0, 3.0), DVec3::Z, DVec3::Y * 3.0, lambert(reflectance, 0.0));
+        let mut screen = lambert(reflectance, 0.0);
+        screen.double_sided = true;
+        add_quad(&mut model, DVec3::new(x, 0.0, 3.0), DVec3::Y * 3.0, DVec3::Z, screen);
     }
     model.lights.extend((0..count).map(|i| light(i, count)));
     model
@@ -216,7 +217,7 @@ fn luminaires_with_extent_are_chosen_by_place_as_by_flux() {
 
 /// Pixels and lux-meters of the hall with many lights, its floor near walls included.
 fn whole_job(run: &str) -> String {
-    let camera = "[[camera]]\nname = \"view\"\neye = [0.5, 1.5, 0.5]\ntarget = [8.0, 0.5, 6.0]\nup = [0, 1, 0]\n\
+    let camera = "[[camera]]\nname = \"view\"\neye = [0.5, 1.5, 0.5]\ntarget = [8.0, 0.5, 2.0]\nup = [0, 1, 0]\n\
                   vertical_fov_degrees = 0.1\nwidth = 3\nheight = 2\n";
     format!("[run]\n{run}{camera}") + &points("p", [([6.0, 0.0, 0.05], UP), ([11.0, 1.0, 4.0], [-1.0, 0.0, 0.0])])
 }

@@ -175,9 +175,9 @@ fn the_picture_of_every_shape_has_intensity_over_shown_area() {
         let scores = Realization::new(&plan.job, &scene, &plan.bounds).batch(0);
         let tolerance = match shape {
             "sphere" => 5e-3,
-            // The pixel is the mean over a hundredth of a degree.
-            "rectangle" | "box" => 2e-4,
-            _ => 2e-3,
+            // A batch looks somewhere in the hundredth of a degree of a pixel, and 1/cos is steep where a flat shape is seen at a slant.
+            "rectangle" | "box" => 1e-3,
+            _ => 3e-3,
         };
         for (w, set) in directions.iter().zip(&scores.sets) {
             let expected = intensity(&file, *w) / shown(shape, [w.x, -w.z, -w.y]);
