@@ -5,7 +5,7 @@
 //! correctly rounded by IEEE 754 and may be used directly. `clippy.toml` refuses the others outside this file.
 
 pub use glam::{DMat3, DMat4, DQuat, DVec2, DVec3, DVec4, Vec3};
-pub use libm::{acos, atan2, cbrt, ceil, cos, exp, floor, log, log1p, log2, pow, sin, tan};
+pub use libm::{acos, asin, atan2, cbrt, ceil, cos, exp, floor, log, log1p, log2, pow, sin, tan};
 pub use std::f64::consts::PI;
 
 /// Sine and cosine of `angle` \[rad\].

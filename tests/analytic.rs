@@ -29,3 +29,18 @@ fn one_reflection() {
 fn cube_lit_from_its_middle() {
     assert_theme("cube/");
 }
+
+#[test]
+fn luminaires_and_luminous_areas() {
+    assert_theme("luminaire/");
+}
+
+#[test]
+fn openings() {
+    assert_theme("opening/");
+}
+
+#[test]
+fn lit_walls_and_screens() {
+    assert_theme("reflection/");
+}

@@ -58,7 +58,7 @@ pub fn run(replicates: u64, mut done: impl FnMut(&[Counted])) -> Result<Vec<Coun
     Ok(all)
 }
 
-fn tables(sampling: &str, batches: u32, histories: u32) -> String {
+pub(super) fn tables(sampling: &str, batches: u32, histories: u32) -> String {
     let sampling = sampled(sampling);
     format!("[run]\nhistories_per_batch = {histories}\nbatches = {batches}\n{sampling}")
 }
@@ -68,7 +68,7 @@ fn exact(name: &str, kind: Kind, truth: f64) -> Quantity {
 }
 
 /// The quantities with truths from long runs of `experiment`.
-fn measured(experiment: &Experiment, wanted: &[(&str, Kind)]) -> Vec<Quantity> {
+pub(super) fn measured(experiment: &Experiment, wanted: &[(&str, Kind)]) -> Vec<Quantity> {
     let runs: Vec<Replicate> =
         (1..=LONG).into_par_iter().map(|i| Replicate::new(experiment, OTHER_SEEDS + i)).collect();
     let means = |kind: &Kind| -> Vec<Estimate> {
@@ -154,7 +154,7 @@ fn lamp_in_cube(sampling: &str, batches: u32, histories: u32, grids: bool, n: u6
 }
 
 /// A camera of which all pixels are monitored.
-fn camera(name: &str, eye: [f64; 3], target: [f64; 3], degrees: f64, [width, height]: [u32; 2]) -> String {
+pub(super) fn camera(name: &str, eye: [f64; 3], target: [f64; 3], degrees: f64, [width, height]: [u32; 2]) -> String {
     let pixels: Vec<[u32; 2]> = (0..width * height).map(|i| [i % width, i / width]).collect();
     format!(
         "[[camera]]\nname = \"{name}\"\neye = {eye:?}\ntarget = {target:?}\nup = [0, 0, 1]\n\

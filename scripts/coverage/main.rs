@@ -3,6 +3,7 @@
 //! ```text
 //! cargo run --release --example coverage -- edge SAMPLING KERNEL REPLICATES      lux-meters and a pixel at an edge
 //! cargo run --release --example coverage -- cases REPLICATES                     small cases of every kind
+//! cargo run --release --example coverage -- lights REPLICATES                    many lights, lights with an extent
 //! cargo run --release --example coverage -- convergence SAMPLING SEEDS           no floor beside a column
 //! ```
 //!
@@ -13,6 +14,7 @@ mod cases;
 mod convergence;
 mod count;
 mod edge;
+mod lights;
 mod marks;
 mod replicate;
 
@@ -30,7 +32,7 @@ fn main() {
 }
 
 fn run(words: &[&str]) -> Result<()> {
-    let allowed = "edge SAMPLING KERNEL REPLICATES, cases REPLICATES, convergence SAMPLING SEEDS";
+    let allowed = "edge SAMPLING KERNEL REPLICATES, cases REPLICATES, lights REPLICATES, convergence SAMPLING SEEDS";
     let last = words.last().and_then(|w| w.parse::<u64>().ok()).filter(|&n| n > 1);
     match (words, last) {
         (["edge", sampling, kernel @ ("bounded" | "plain"), _], Some(n)) => {
@@ -43,6 +45,11 @@ fn run(words: &[&str]) -> Result<()> {
         (["cases", _], Some(n)) => {
             println!("{}", Counted::HEAD);
             marks::print(&cases::run(n, print)?);
+            Ok(())
+        }
+        (["lights", _], Some(n)) => {
+            println!("{}", Counted::HEAD);
+            marks::print(&lights::run(n, print)?);
             Ok(())
         }
         (["convergence", sampling, _], Some(n)) => convergence::run(sampling, n),

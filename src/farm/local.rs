@@ -15,6 +15,7 @@ use crate::scene::Scene;
 use crate::tally::Scores;
 use crate::transport::connection::{Connected, Connectors, Link, Rule, TILE, Tile, connect};
 use crate::transport::receiver::Receiver;
+use crate::transport::shared::LitPoints;
 use rayon::prelude::*;
 use score::Score;
 use std::ops::Range;
@@ -51,7 +52,7 @@ struct Block<'a> {
     scene: &'a Scene,
     histories: &'a Connectors,
     /// Points of emitters, for each position in a bin.
-    shared: &'a [Connectors],
+    shared: &'a [LitPoints],
     rule: &'a Rule,
     bins: &'a [u32],
     batch: u64,

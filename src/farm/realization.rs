@@ -15,7 +15,7 @@ use crate::random::sobol::PointSet;
 use crate::random::{Domain, Stream};
 use crate::scene::Scene;
 use crate::tally::{BatchScores, Scores};
-use crate::transport::connection::Connectors;
+use crate::transport::connection::{Connectors, TILE};
 use crate::transport::trajectory::{FluxBalance, Record, Segment, Vertex, trace};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -46,10 +46,11 @@ impl<'a> Realization<'a> {
     /// Prepares the receivers of `job` in `scene`, in the current rayon pool; `bounds` as in the plan.
     pub fn new(job: &'a Job, scene: &'a Scene, bounds: &[f64]) -> Self {
         let sets = ReceiverSet::all(job, scene, bounds);
-        let orders_of_bins = sets.iter().map(|s| order_of_bins(s, scene)).collect();
+        let orders_of_bins: Vec<_> = sets.iter().map(|s| order_of_bins(s, scene)).collect();
         let regions = Regions::place(job, scene, "", centres).expect("regions were placed when the job was planned");
-        let fixed = |set: &ReceiverSet| fixed_direct(set, scene, job.transport.estimator);
-        let mut fixed_direct: Vec<Vec<f64>> = sets.iter().map(fixed).collect();
+        let estimator = job.transport.estimator;
+        let fixed = |(set, order): (&ReceiverSet, &Vec<u32>)| fixed_direct(set, scene, order, estimator);
+        let mut fixed_direct: Vec<Vec<f64>> = sets.iter().zip(&orders_of_bins).map(fixed).collect();
         // A map has no direct light that is the same in every batch, and so has no region.
         fixed_direct.resize_with(sets.len() + regions.len(), Vec::new);
         let trajectories = Stream::new(job.run.seed, Domain::Trajectory, "");
@@ -219,12 +220,17 @@ fn order_of_bins(set: &ReceiverSet, scene: &Scene) -> Vec<u32> {
     kd_order(&centers)
 }
 
-/// Direct light of the bins of `set` that is the same in every batch; empty for zero everywhere.
-fn fixed_direct(set: &ReceiverSet, scene: &Scene, estimator: Estimator) -> Vec<f64> {
-    let bins = if set.has_no_fixed_direct() { 0 } else { set.shape().bins() };
-    let of = |i| match estimator {
-        Estimator::Local | Estimator::Reverse => set.fixed_direct(scene, i),
-        Estimator::DirectSimulation => set.counted_beforehand(i),
-    };
-    (0..bins).into_par_iter().map(of).collect()
+/// Direct light of the bins of `set` that is the same in every batch; empty for zero everywhere. `order` has the bins in the order in
+/// which they share tiles.
+fn fixed_direct(set: &ReceiverSet, scene: &Scene, order: &[u32], estimator: Estimator) -> Vec<f64> {
+    if set.has_no_fixed_direct() {
+        return Vec::new();
+    }
+    if estimator == Estimator::DirectSimulation {
+        return (0..set.shape().bins()).map(|i| set.counted_beforehand(i)).collect();
+    }
+    let mut all = vec![0.0; set.shape().bins()];
+    let tiles: Vec<Vec<f64>> = order.par_chunks(TILE).map(|bins| set.fixed_direct(scene, bins)).collect();
+    order.iter().zip(tiles.into_iter().flatten()).for_each(|(&bin, light)| all[bin as usize] = light);
+    all
 }

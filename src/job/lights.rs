@@ -76,6 +76,9 @@ pub struct Luminaire {
     /// What shines: a point, or the luminous opening that the file describes.
     #[serde(default)]
     pub extent: Extent,
+    /// Node of the scene whose mesh, and what hangs below, shines in the place of a point; left out: as `extent` says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mesh: Option<String>,
     /// Flux to which the web is scaled before the two factors \[lm\]; left out: as the file has it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub flux: Option<f64>,
@@ -157,8 +160,13 @@ fn check_luminaire(c: &Checker, at: &str, luminaire: &Luminaire, has_scene: bool
     if let Some(node) = &luminaire.node {
         c.that(&format!("{at}.node"), node, has_scene, "a node only with a scene")?;
     }
-    let placed = luminaire.node.is_some() || luminaire.position.is_some();
-    c.that(&format!("{at}.position"), "(missing)", placed, "a position, or a node")?;
+    if let Some(mesh) = &luminaire.mesh {
+        c.that(&format!("{at}.mesh"), mesh, has_scene, "a mesh only with a scene")?;
+        let alone = luminaire.extent == Extent::Point;
+        c.that(&format!("{at}.extent"), "opening", alone, "left out beside a mesh, which is what shines")?;
+    }
+    let placed = luminaire.node.is_some() || luminaire.position.is_some() || luminaire.mesh.is_some();
+    c.that(&format!("{at}.position"), "(missing)", placed, "a position, a node or a mesh")?;
     c.position(&format!("{at}.position"), luminaire.position.unwrap_or_default())?;
     c.direction(&format!("{at}.aim"), luminaire.aim)?;
     c.direction(&format!("{at}.c0"), luminaire.c0)?;

@@ -21,7 +21,7 @@ const UNIT: f64 = 1.0 / (1u64 << 53) as f64;
 pub enum Domain {
     /// Light trajectories; the index is the global index of the trajectory.
     Trajectory,
-    /// Sub-pixel positions, mirror choices and area-light samples of one receiver set; the index is
+    /// Sub-pixel positions, mirror choices, the choice of lights and area-light samples of one receiver set; the index is
     /// `batch * bins + bin`.
     Receiver,
     /// Trajectories that fix the bound of the kernel before the run; the index is that of the trajectory.

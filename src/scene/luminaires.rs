@@ -39,13 +39,18 @@ impl Model {
     /// Hangs the `luminaire` with the web of `photometry`. `job` is the name of the job file, `at` the entry that asks for it.
     ///
     /// # Errors
-    /// [`Error::Input`] where there is not one node of its name, or its directions or the node's transform leave none.
+    /// [`Error::Input`] where there is not one node of its name, its directions or the node's transform leave none, or the mesh that
+    /// shall shine is none that can.
     pub fn hang(&mut self, (job, at): (&str, &str), luminaire: &job::Luminaire, photometry: &Photometry) -> Result<()> {
         let world = match &luminaire.node {
             Some(name) => self.only_node(job, at, name)?,
             None => DMat4::IDENTITY,
         };
-        let position = world.transform_point3(luminaire.position.unwrap_or_default().into());
+        let mesh = luminaire.mesh.as_ref().map(|name| self.take_mesh((job, at), name)).transpose()?;
+        let position = match &mesh {
+            Some(mesh) if luminaire.position.is_none() => mesh.middle,
+            _ => world.transform_point3(luminaire.position.unwrap_or_default().into()),
+        };
         let frame = DMat3::from_mat4(world);
         let placement =
             Placement::new(position, frame, luminaire.aim.into(), luminaire.c0.into()).ok_or_else(|| {
@@ -68,9 +73,10 @@ impl Model {
         }
         let factor = Colour::grey(scale * luminaire.multiplier * luminaire.dimming);
         let light = Luminaire::new(photometry, &placement, factor);
-        match luminaire.extent {
-            job::Extent::Point => self.lights.push(Light::Luminaire(light)),
-            job::Extent::Opening => {
+        match (mesh, luminaire.extent) {
+            (Some(mesh), _) => self.add_faces(Extended::of_mesh(light, mesh)),
+            (None, job::Extent::Point) => self.lights.push(Light::Luminaire(light)),
+            (None, job::Extent::Opening) => {
                 let extended = Extended::new(light, &photometry.opening, &placement).ok_or_else(|| {
                     let allowed = "point: its file gives no luminous opening";
                     Error::input(job, format!("{at}.extent"), "opening", allowed)
@@ -108,7 +114,7 @@ impl Model {
     }
 
     /// Adds a warning that is not there yet: many luminaires share a file.
-    fn warn(&mut self, warning: String) {
+    pub(super) fn warn(&mut self, warning: String) {
         if !self.warnings.contains(&warning) {
             self.warnings.push(warning);
         }

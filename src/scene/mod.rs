@@ -4,10 +4,14 @@
 //! builds the acceleration structure, turns emissive triangles into area lights and prepares the choice of a
 //! source in proportion to flux. A scene does not know receivers, seeds or files.
 
+mod beam;
 mod body;
+mod choice;
 pub mod gltf;
+mod groups;
 mod light;
 mod luminaires;
+mod luminous_mesh;
 mod nodes;
 mod panel;
 pub mod photometric_web;
@@ -15,7 +19,10 @@ mod reflectance;
 mod replace;
 mod source;
 
+pub use beam::Beam;
 pub use body::{Body, BodyPoint, in_cone};
+pub use choice::Choice;
+pub use groups::Groups;
 pub use light::Light;
 pub use nodes::{Node, Nodes};
 pub use panel::{Extended, Panel};

@@ -7,6 +7,7 @@
 //! The same in all points that a direction shows, so that from afar the intensity is that of the file. A history leaves in a direction
 //! drawn from the web, from a point uniform over what that direction shows of the opening.
 
+use super::luminous_mesh::LuminousMesh;
 use super::photometric_web::{Luminaire, Opening, Placement, Shape};
 use super::source::Emitter;
 use crate::geometry::Geometry;
@@ -66,6 +67,11 @@ impl Extended {
         let center = luminaire.position;
         let faces: Vec<Triangle> = faces.into_iter().map(|face| outwards(face, flat).map(|p| center + p)).collect();
         Some(Extended { luminaire, faces, flat })
+    }
+
+    /// A luminaire whose light leaves `mesh`.
+    pub(super) fn of_mesh(luminaire: Luminaire, mesh: LuminousMesh) -> Extended {
+        Extended { luminaire, faces: mesh.faces, flat: mesh.flat }
     }
 }
 

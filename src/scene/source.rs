@@ -3,13 +3,19 @@
 //! A history chooses its source in proportion to luminous flux and leaves it with the exact distribution of its
 //! emission, so every history starts with the same luminous weight: the flux of all sources together.
 
+use super::beam::Beam;
 use super::body::Body;
+use super::choice::Choice;
+use super::groups::Groups;
 use super::light::Light;
 use super::panel::Panel;
 use crate::geometry::Geometry;
 use crate::math::{DVec3, PI, to_world};
 use crate::photometry::Colour;
 use crate::random::{Generator, cosine_hemisphere};
+
+/// So many emitters, or fewer, are chosen by flux everywhere.
+const FEW_EMITTERS: usize = 64;
 
 /// An emissive triangle: a Lambert area light.
 #[derive(Clone, Debug)]
@@ -37,7 +43,7 @@ impl Emitter {
         Emitter { primitive, corners: [a, b, c], normal, area, luminance, double_sided }
     }
 
-    fn flux(&self) -> Colour {
+    pub(super) fn flux(&self) -> Colour {
         self.luminance * (PI * self.area * if self.double_sided { 2.0 } else { 1.0 })
     }
 
@@ -75,16 +81,22 @@ pub struct Sources {
     pub emitters: Vec<Emitter>,
     /// Luminaires with extent, in the order of their primitives.
     pub panels: Vec<Panel>,
-    /// Running sum of luminous flux over the lights \[lm\].
-    light_flux: Vec<f64>,
-    /// The same over the emitters, from zero: beside a lamp of 10^12 lm a panel of 1 lm keeps its digits.
-    emitter_flux: Vec<f64>,
+    /// The choice of a light in proportion to luminous flux \[lm\].
+    light_flux: Choice,
+    /// The same of an emitter, on its own: beside a lamp of 10^12 lm a panel of 1 lm keeps its digits.
+    emitter_flux: Choice,
     /// Star-shaped objects that emit.
     pub bodies: Vec<Body>,
-    /// Running sum of luminous flux over the bodies \[lm\].
-    body_flux: Vec<f64>,
-    /// The same over the panels.
-    panel_flux: Vec<f64>,
+    /// The emitters by neighbourhood, where they are many.
+    groups: Option<Groups>,
+    /// The same of a body.
+    body_flux: Choice,
+    /// The same of a panel.
+    panel_flux: Choice,
+    /// Bounds of the lights; none of parallel light.
+    beams: Vec<Option<Beam>>,
+    /// Bounds of the panels.
+    panel_beams: Vec<Beam>,
     /// Centre and radius of the sphere that parallel light must cover \[m\].
     covered: (DVec3, f64),
 }
@@ -101,13 +113,29 @@ impl Sources {
         let lit = |flux: Colour| flux.luminance() > 0.0;
         let lights: Vec<Light> = lights.into_iter().filter(|l| lit(l.flux(covered.1))).collect();
         let emitters: Vec<Emitter> = emitters.into_iter().filter(|e| lit(e.flux())).collect();
-        let light_flux = running_sum(lights.iter().map(|l| l.flux(covered.1)));
-        let emitter_flux = running_sum(emitters.iter().map(Emitter::flux));
+        let light_flux = Choice::by_flux(lights.iter().map(|l| l.flux(covered.1)));
+        let emitter_flux = Choice::by_flux(emitters.iter().map(Emitter::flux));
         let panels: Vec<Panel> = panels.into_iter().filter(|p| lit(p.luminaire.flux())).collect();
-        let panel_flux = running_sum(panels.iter().map(|p| p.luminaire.flux()));
+        let panel_flux = Choice::by_flux(panels.iter().map(|p| p.luminaire.flux()));
         let bodies: Vec<Body> = bodies.into_iter().filter(|b| lit(b.flux())).collect();
-        let body_flux = running_sum(bodies.iter().map(Body::flux));
-        Sources { lights, emitters, panels, bodies, light_flux, emitter_flux, panel_flux, body_flux, covered }
+        let body_flux = Choice::by_flux(bodies.iter().map(Body::flux));
+        let groups = (emitters.len() > FEW_EMITTERS).then(|| Groups::new(&emitters));
+        let beams = lights.iter().map(Beam::of_light).collect();
+        let panel_beams = panels.iter().map(Beam::of_panel).collect();
+        Sources {
+            lights,
+            emitters,
+            panels,
+            light_flux,
+            emitter_flux,
+            groups,
+            bodies,
+            body_flux,
+            panel_flux,
+            beams,
+            panel_beams,
+            covered,
+        }
     }
 
     /// Number of sources.
@@ -122,69 +150,95 @@ impl Sources {
 
     /// Luminous flux of all sources \[lm\].
     pub fn flux(&self) -> f64 {
-        last(&self.light_flux) + last(&self.emitter_flux) + last(&self.panel_flux) + last(&self.body_flux)
+        self.light_flux.all() + self.emitter_flux.all() + self.panel_flux.all() + self.body_flux.all()
     }
 
-    /// Chooses a face of a panel by `u` in [0, 1), the panel in proportion to flux and the face to area: the two, and their
+    /// Bounds of the lights, `None` of parallel light.
+    pub fn beams(&self) -> &[Option<Beam>] {
+        &self.beams
+    }
+
+    /// The choice of a light in proportion to flux.
+    pub fn lights_by_flux(&self) -> &Choice {
+        &self.light_flux
+    }
+
+    /// Bounds of the panels.
+    pub fn panel_beams(&self) -> &[Beam] {
+        &self.panel_beams
+    }
+
+    /// The choice of a panel in proportion to flux.
+    pub fn panels_by_flux(&self) -> &Choice {
+        &self.panel_flux
+    }
+
+    /// Chooses a face of a panel by `u` in [0, 1), the panel as `among` says and the face in proportion to area: the two, and their
     /// probability.
-    pub fn choose_face(&self, u: f64) -> (&Panel, &Emitter, f64) {
-        let all = last(&self.panel_flux);
-        let number = choose(&self.panel_flux, u * all);
+    pub fn choose_face(&self, among: &Choice, u: f64) -> (&Panel, &Emitter, f64) {
+        let (number, left) = among.choose(u);
         let panel = &self.panels[number];
-        let own = panel.luminaire.flux().luminance();
-        let mut left = ((u * all - (self.panel_flux[number] - own)) / own).clamp(0.0, 1.0) * panel.area;
+        let mut left = left.clamp(0.0, 1.0) * panel.area;
         let reached = |face: &&Emitter| {
             left -= face.area;
             left < 0.0
         };
         let face = panel.faces.iter().find(reached).unwrap_or(&panel.faces[panel.faces.len() - 1]);
-        (panel, face, self.face_probability(panel, face))
+        (panel, face, among.probability(number) * face.area / panel.area)
     }
 
     /// The panel of which the triangle `primitive` is a face, and the face.
     pub fn panel_face(&self, primitive: u32) -> Option<(&Panel, &Emitter)> {
-        let number = self.panels.partition_point(|panel| panel.faces[0].primitive <= primitive).checked_sub(1)?;
-        let panel = &self.panels[number];
+        let panel = &self.panels[self.panel_with(primitive)?];
         let face = panel.faces.get((primitive - panel.faces[0].primitive) as usize)?;
         Some((panel, face))
     }
 
     /// Probability with which [`Sources::choose_face`] chooses `face` of `panel`.
-    pub fn face_probability(&self, panel: &Panel, face: &Emitter) -> f64 {
-        panel.luminaire.flux().luminance() / last(&self.panel_flux) * face.area / panel.area
+    pub fn face_probability(&self, among: &Choice, panel: &Panel, face: &Emitter) -> f64 {
+        let number = self.panel_with(face.primitive).expect("a face belongs to a panel");
+        among.probability(number) * face.area / panel.area
     }
 
-    /// Chooses an emitter in proportion to flux by `u` in [0, 1): the emitter and its probability.
-    pub fn choose_emitter(&self, u: f64) -> (&Emitter, f64) {
-        let (number, probability) = self.choose_number(u);
-        (&self.emitters[number], probability)
+    /// Number of the last panel whose faces begin at `primitive` or before.
+    fn panel_with(&self, primitive: u32) -> Option<usize> {
+        self.panels.partition_point(|panel| panel.faces[0].primitive <= primitive).checked_sub(1)
     }
 
-    /// The same, the emitter by its number.
-    pub fn choose_number(&self, u: f64) -> (usize, f64) {
-        let all = last(&self.emitter_flux);
-        let number = choose(&self.emitter_flux, u * all);
-        (number, self.emitters[number].flux().luminance() / all)
+    /// The emitters in groups, where they are so many that it pays.
+    pub fn groups(&self) -> Option<&Groups> {
+        self.groups.as_ref()
+    }
+
+    /// Chooses an emitter by `u` in [0, 1), its group as `among` says or in proportion to flux: its number and probability.
+    pub fn choose_emitter(&self, among: Option<&Choice>, u: f64) -> (usize, f64) {
+        if let (Some(groups), Some(among)) = (&self.groups, among) {
+            return groups.choose(among, u);
+        }
+        let number = self.emitter_flux.at(u * self.emitter_flux.all());
+        (number, self.emitter_flux.probability(number))
     }
 
     /// The emitter that is the triangle `primitive`, with its probability in [`Sources::choose_emitter`].
-    pub fn emitter(&self, primitive: u32) -> Option<(&Emitter, f64)> {
-        let index = self.emitters.binary_search_by_key(&primitive, |e| e.primitive).ok()?;
-        let emitter = &self.emitters[index];
-        Some((emitter, emitter.flux().luminance() / last(&self.emitter_flux)))
+    pub fn emitter(&self, among: Option<&Choice>, primitive: u32) -> Option<(&Emitter, f64)> {
+        let number = self.emitters.binary_search_by_key(&primitive, |e| e.primitive).ok()?;
+        let probability = match (&self.groups, among) {
+            (Some(groups), Some(among)) => groups.probability(among, number),
+            _ => self.emitter_flux.probability(number),
+        };
+        Some((&self.emitters[number], probability))
     }
 
     /// Chooses a body in proportion to flux by `u` in [0, 1): the body and its probability.
     pub fn choose_body(&self, u: f64) -> (&Body, f64) {
-        let all = last(&self.body_flux);
-        let body = &self.bodies[choose(&self.body_flux, u * all)];
-        (body, body.flux().luminance() / all)
+        let number = self.body_flux.at(u * self.body_flux.all());
+        (&self.bodies[number], self.body_flux.probability(number))
     }
 
     /// The body that is the surface `primitive`, with its probability in [`Sources::choose_body`].
     pub fn body(&self, primitive: u32) -> Option<(&Body, f64)> {
-        let body = self.bodies.iter().find(|body| body.primitive == primitive)?;
-        Some((body, body.flux().luminance() / last(&self.body_flux)))
+        let number = self.bodies.iter().position(|body| body.primitive == primitive)?;
+        Some((&self.bodies[number], self.body_flux.probability(number)))
     }
 
     /// The emitters with their numbers.
@@ -197,15 +251,15 @@ impl Sources {
         let mut target = if self.len() == 1 { 0.0 } else { rng.uniform() * self.flux() };
         let kinds = [&self.light_flux, &self.emitter_flux, &self.panel_flux, &self.body_flux];
         // Rounding may leave a rest behind the last source.
-        let mut chosen = kinds.iter().rposition(|sums| !sums.is_empty()).expect("histories start where there is light");
-        for (kind, sums) in kinds.iter().enumerate().take(chosen) {
-            if target < last(sums) {
+        let mut chosen = kinds.iter().rposition(|kind| !kind.is_empty()).expect("histories start where there is light");
+        for (kind, fluxes) in kinds.iter().enumerate().take(chosen) {
+            if target < fluxes.all() {
                 chosen = kind;
                 break;
             }
-            target -= last(sums);
+            target -= fluxes.all();
         }
-        let number = choose(kinds[chosen], target);
+        let number = kinds[chosen].at(target);
         let ((origin, direction), flux) = match chosen {
             0 => {
                 let light = &self.lights[number];
@@ -218,23 +272,6 @@ impl Sources {
         // flux over the probability of the choice: the colour of the source, the luminous flux of all.
         Emission { origin, direction, weight: flux * (self.flux() / flux.luminance()) }
     }
-}
-
-fn running_sum(fluxes: impl Iterator<Item = Colour>) -> Vec<f64> {
-    let add = |sum: &mut f64, flux: Colour| {
-        *sum += flux.luminance();
-        Some(*sum)
-    };
-    fluxes.scan(0.0, add).collect()
-}
-
-fn last(sums: &[f64]) -> f64 {
-    sums.last().copied().unwrap_or(0.0)
-}
-
-/// Index of the source in whose share of the running sum `target` lies.
-fn choose(sums: &[f64], target: f64) -> usize {
-    sums.partition_point(|&sum| sum <= target).min(sums.len() - 1)
 }
 
 fn emit_triangle(emitter: &Emitter, geometry: &Geometry, rng: &mut Generator) -> (DVec3, DVec3) {

@@ -72,7 +72,7 @@ pub fn continue_from(scene: &Scene, receiver: &Receiver, bound: f64, rng: &mut G
     for _ in 0..MAX_POINTS {
         let next = found.receiver(scene, weight);
         if next.response.is_peaked() {
-            path.caustic += from_lights_as_if_matt(scene, &next).luminance();
+            path.caustic += from_lights_as_if_matt(scene, &next, rng).luminance();
         }
         path.points.push(next);
         let Some(further) = step(scene, &next, bound, rng) else { break };

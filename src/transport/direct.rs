@@ -5,13 +5,14 @@
 //! the response is peaked, directions drawn from it look for the emitters as well, and the two are weighed by the
 //! balance heuristic (Veach and Guibas 1995): each where its density is the higher.
 
+use super::lamps::{Asked, all, some_by_flux};
 use super::receiver::Receiver;
 use super::spherical_triangle::SphericalTriangle;
 use crate::geometry::{Hit, Ray};
 use crate::math::DVec3;
 use crate::photometry::Colour;
 use crate::random::Generator;
-use crate::scene::{Emitter, Panel, Scene};
+use crate::scene::{Choice, Emitter, Panel, Scene};
 
 /// From this distance in lengths of its longest edge on, a triangle is sampled by area: the geometric factor then
 /// varies less than threefold over it, and the solid angle of a tiny triangle need not be computed.
@@ -25,18 +26,21 @@ pub fn emitter_samples(histories: u64) -> u64 {
 
 /// Light from point, spot and directional lights, times the response \[lx or cd/m2\].
 pub fn from_lights(scene: &Scene, receiver: &Receiver) -> Colour {
-    light_by_light(scene, receiver, |w_in| receiver.response.to(scene, receiver.normal, w_in))
+    light_by_light(scene, receiver, &all(scene), |w_in| receiver.response.to(scene, receiver.normal, w_in))
 }
 
-/// The same with the response of a matt surface that reflects as much: without the peaks of a narrow lobe.
-pub fn from_lights_as_if_matt(scene: &Scene, receiver: &Receiver) -> Colour {
-    light_by_light(scene, receiver, |w_in| receiver.response.as_if_matt(scene, receiver.normal, w_in))
+/// The same with the response of a matt surface that reflects as much: without the peaks of a narrow lobe. Of many lights some
+/// are asked.
+pub fn from_lights_as_if_matt(scene: &Scene, receiver: &Receiver, rng: &mut Generator) -> Colour {
+    let asked = some_by_flux(scene, rng);
+    light_by_light(scene, receiver, &asked, |w_in| receiver.response.as_if_matt(scene, receiver.normal, w_in))
 }
 
-fn light_by_light(scene: &Scene, receiver: &Receiver, response: impl Fn(DVec3) -> Colour) -> Colour {
+fn light_by_light(scene: &Scene, receiver: &Receiver, asked: &[Asked], response: impl Fn(DVec3) -> Colour) -> Colour {
     let lifted = scene.geometry.lift(receiver.position, receiver.normal);
     let mut sum = Colour::BLACK;
-    for light in &scene.sources.lights {
+    for &(number, weight) in asked {
+        let light = &scene.sources.lights[number];
         let (from, w_in, across) = light.at(receiver.position);
         let cosine = -receiver.normal.dot(w_in);
         let visible = || match from {
@@ -45,42 +49,51 @@ fn light_by_light(scene: &Scene, receiver: &Receiver, response: impl Fn(DVec3) -
         };
         // At the lamp itself the cosine is NaN, which is not above zero: no light instead of no number.
         if cosine > 0.0 && !across.is_black() && visible() {
-            sum += across * cosine * response(w_in);
+            sum += across * (weight * cosine) * response(w_in);
         }
     }
     sum
 }
 
-/// Unbiased estimate of the light from area lights by `samples` samples, times the response \[lx or cd/m2\].
-pub fn from_emitters(scene: &Scene, receiver: &Receiver, samples: u64, rng: &mut Generator) -> Colour {
-    if scene.sources.emitters.is_empty() {
+/// Unbiased estimate of the light from area lights by `samples` samples, times the response \[lx or cd/m2\]; `among` is the choice of
+/// their groups, without which they are chosen by flux.
+pub fn from_emitters(
+    scene: &Scene,
+    receiver: &Receiver,
+    among: Option<&Choice>,
+    samples: u64,
+    rng: &mut Generator,
+) -> Colour {
+    // Where there are none, or nothing of them arrives.
+    if scene.sources.emitters.is_empty() || among.is_some_and(|among| among.all() == 0.0) {
         return Colour::BLACK;
     }
     let draw = |from: DVec3, choice: f64, rng: &mut Generator| {
-        let (emitter, probability) = scene.sources.choose_emitter(choice);
-        let sight = Sight::new(emitter, probability, from);
+        let (number, probability) = scene.sources.choose_emitter(among, choice);
+        let sight = Sight::new(&scene.sources.emitters[number], probability, from);
         sight.map_or(Colour::BLACK, |sight| sample_emitter(scene, receiver, &sight, rng))
     };
     let seen = |from: DVec3, hit: &Hit, w_in: DVec3| {
-        let (emitter, probability) = scene.sources.emitter(hit.primitive)?;
+        let (emitter, probability) = scene.sources.emitter(among, hit.primitive)?;
         Some(Sight::new(emitter, probability, from)?.of_hit(hit, w_in))
     };
     sampled(scene, receiver, samples, rng, draw, seen)
 }
 
-/// The same of luminaires with extent.
-pub fn from_panels(scene: &Scene, receiver: &Receiver, samples: u64, rng: &mut Generator) -> Colour {
-    if scene.sources.panels.is_empty() {
+/// The same of luminaires with extent, chosen as `among` says.
+pub fn from_panels(scene: &Scene, receiver: &Receiver, among: &Choice, samples: u64, rng: &mut Generator) -> Colour {
+    // Where there are none, or nothing of them arrives.
+    if among.all() == 0.0 {
         return Colour::BLACK;
     }
     let draw = |from: DVec3, choice: f64, rng: &mut Generator| {
-        let (panel, face, probability) = scene.sources.choose_face(choice);
+        let (panel, face, probability) = scene.sources.choose_face(among, choice);
         let sight = Sight::new(face, probability, from);
         sight.map_or(Colour::BLACK, |sight| sample_emitter(scene, receiver, &sight.of(panel), rng))
     };
     let seen = |from: DVec3, hit: &Hit, w_in: DVec3| {
         let (panel, face) = scene.sources.panel_face(hit.primitive)?;
-        let sight = Sight::new(face, scene.sources.face_probability(panel, face), from)?;
+        let sight = Sight::new(face, scene.sources.face_probability(among, panel, face), from)?;
         Some(sight.of(panel).of_hit(hit, w_in))
     };
     sampled(scene, receiver, samples, rng, draw, seen)

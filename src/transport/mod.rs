@@ -45,6 +45,7 @@ pub mod continuation;
 pub mod crossing;
 pub mod direct;
 pub mod eye;
+pub mod lamps;
 pub mod neighbours;
 pub mod receiver;
 pub mod reverse;

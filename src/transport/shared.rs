@@ -10,8 +10,9 @@
 //! ([`super::direct`]). Who takes part depends on places alone, so both are unbiased.
 
 use super::bodies::from_bodies;
-use super::connection::{Connectors, Link, LitPoint, Rule, Tile, connect};
+use super::connection::{Connected, Connectors, Link, LitPoint, Rule, Tile, connect};
 use super::direct::{from_emitters, from_panels, from_some_emitters};
+use super::lamps::{Asked, ask, groups_of, panels_of};
 use super::receiver::Receiver;
 use crate::geometry::Ray;
 use crate::geometry::visibility::{BUNDLE, BUNDLES, Lanes, Points, Scratch};
@@ -20,7 +21,7 @@ use crate::photometry::Colour;
 use crate::random::Generator;
 use crate::random::sobol::PointSet;
 use crate::scene::photometric_web::Luminaire;
-use crate::scene::{Emitter, Light, Scene};
+use crate::scene::{Choice, Emitter, Light, Scene};
 use std::ops::Range;
 
 /// Nearer than this to the centre, in lengths of its longest edge, an emitter is sampled for each receiver alone.
@@ -28,84 +29,129 @@ const NEAR: f64 = 1.0;
 /// Points whose light is summed in f32 before it goes into f64.
 pub const TOGETHER: usize = 16;
 
-/// `count` points of the emitters of `scene`, a power of two, to be shared by receivers.
-pub fn lit_points(scene: &Scene, set: &PointSet, count: u32) -> Connectors {
-    let mut connectors = Connectors::default();
-    if scene.sources.emitters.is_empty() {
-        return connectors;
-    }
-    for first in (0..count).step_by(TOGETHER) {
-        let run = first..(first + TOGETHER as u32).min(count);
-        let points: Vec<LitPoint> = run.flat_map(|i| lit_point(scene, set, i, count)).collect();
-        connectors.push_lit(scene, &points);
-    }
-    connectors
+/// Points of the emitters of a scene: numbers in the unit cube that receivers share, and what they stand for.
+///
+/// Where emitters are many the same numbers stand for other points in each tile, whose emitters are chosen by what they give there.
+#[derive(Debug)]
+pub struct LitPoints {
+    set: PointSet,
+    count: u32,
+    /// The points where emitters are chosen by flux, in runs of [`TOGETHER`].
+    by_flux: Option<Connectors>,
 }
 
-/// Point number `i` of `count`, on both sides of an emitter that has two.
-fn lit_point(scene: &Scene, set: &PointSet, i: u32, count: u32) -> impl Iterator<Item = LitPoint> {
-    let [choice, x, y, ..] = set.point(i);
-    let (number, probability) = scene.sources.choose_number(choice);
-    let emitter = &scene.sources.emitters[number];
-    let position = emitter.point(DVec2::new(x, y));
-    let intensity = emitter.luminance * (emitter.area / (probability * f64::from(count)));
-    let lit = move |normal: DVec3| LitPoint { position, normal, intensity, emitter: number as u32 };
-    let sides = if emitter.double_sided { 2 } else { 1 };
-    [emitter.normal, -emitter.normal].into_iter().take(sides).map(lit)
+impl LitPoints {
+    /// `count` points, a power of two, by the numbers of `set`.
+    pub fn new(scene: &Scene, set: PointSet, count: u32) -> Self {
+        let mut points = LitPoints { set, count, by_flux: None };
+        if !scene.sources.emitters.is_empty() && scene.sources.groups().is_none() {
+            points.by_flux = Some(points.of_runs(scene, None, 0..points.runs()));
+        }
+        points
+    }
+
+    /// Number of runs.
+    fn runs(&self) -> usize {
+        (self.count as usize).div_ceil(TOGETHER)
+    }
+
+    /// The points of some runs, the groups of their emitters chosen as `among` says.
+    fn of_runs(&self, scene: &Scene, among: Option<&Choice>, runs: Range<usize>) -> Connectors {
+        let mut connectors = Connectors::default();
+        for run in runs {
+            let first = (run * TOGETHER) as u32;
+            let points = first..(first + TOGETHER as u32).min(self.count);
+            let points: Vec<LitPoint> = points.flat_map(|i| self.lit_point(scene, among, i)).collect();
+            connectors.push_lit(scene, &points);
+        }
+        connectors
+    }
+
+    /// Point number `i`, on both sides of an emitter that has two.
+    fn lit_point(&self, scene: &Scene, among: Option<&Choice>, i: u32) -> impl Iterator<Item = LitPoint> {
+        let [choice, x, y, ..] = self.set.point(i);
+        let (number, probability) = scene.sources.choose_emitter(among, choice);
+        let emitter = &scene.sources.emitters[number];
+        let position = emitter.point(DVec2::new(x, y));
+        let intensity = emitter.luminance * (emitter.area / (probability * f64::from(self.count)));
+        let lit = move |normal: DVec3| LitPoint { position, normal, intensity, emitter: number as u32 };
+        let sides = if emitter.double_sided { 2 } else { 1 };
+        [emitter.normal, -emitter.normal].into_iter().take(sides).map(lit)
+    }
 }
 
 /// Points of emitters that receivers share.
 #[derive(Clone, Debug)]
 pub struct Shared<'a> {
     /// All points that were drawn together.
-    pub points: &'a Connectors,
+    points: &'a LitPoints,
     /// Which runs of [`TOGETHER`] of them are used.
-    pub some: Range<usize>,
+    some: Range<usize>,
     /// One over the share of them that is used.
-    pub weight: f64,
+    weight: f64,
 }
 
 impl<'a> Shared<'a> {
     /// All `points`.
-    pub fn all(points: &'a Connectors) -> Self {
-        Shared { points, some: 0..points.histories(), weight: 1.0 }
+    pub fn all(points: &'a LitPoints) -> Self {
+        Shared { points, some: 0..points.runs(), weight: 1.0 }
     }
 
     /// The run number `run`.
-    pub fn run(points: &'a Connectors, run: usize) -> Self {
-        Shared { points, some: run..run + 1, weight: points.histories() as f64 }
+    pub fn run(points: &'a LitPoints, run: usize) -> Self {
+        Shared { points, some: run..run + 1, weight: points.runs() as f64 }
+    }
+
+    /// What they give the receivers of `tile`, the groups of emitters chosen as `among` says.
+    fn connect(&self, scene: &Scene, among: Option<&Choice>, tile: &Tile, rule: &Rule) -> Vec<Connected> {
+        match &self.points.by_flux {
+            Some(points) => connect(scene, points, self.some.clone(), tile, rule),
+            None => {
+                let points = self.points.of_runs(scene, among, self.some.clone());
+                connect(scene, &points, 0..points.histories(), tile, rule)
+            }
+        }
     }
 }
 
-/// Direct light at `receivers`, at most a tile, each with its generator, times their responses \[lx or cd/m2\]: exact from lights
-/// without extent where `lights` asks for it, from emitters by the shared points, or by `samples` of its own.
+/// Direct light at `receivers`, at most a tile, each with its generator, times their responses \[lx or cd/m2\]: from lights
+/// without extent, some `lamps` of them where there are more, none where it is 0; from emitters by the shared points, or by `samples`
+/// of its own.
 pub fn direct_light(
     scene: &Scene,
     receivers: &mut [(Receiver, &mut Generator)],
-    Shared { points, some, weight }: Shared,
+    shared: &Shared,
     samples: u64,
-    (lights, channels): (bool, usize),
+    (lamps, channels): (u64, usize),
 ) -> Vec<Colour> {
     let places: Vec<Receiver> = receivers.iter().map(|(r, _)| *r).collect();
-    let mut light = if lights { of_lights(scene, &places) } else { vec![Colour::BLACK; places.len()] };
+    let Some((_, first)) = receivers.first_mut() else { return Vec::new() };
+    let asked = if lamps > 0 { ask(scene, &places, lamps, first) } else { Vec::new() };
+    let mut light = of_lights(scene, &places, &asked);
+    let panels = panels_of(scene, &places);
     for ((receiver, rng), light) in receivers.iter_mut().zip(&mut light) {
-        *light += from_panels(scene, receiver, samples, rng);
+        *light += from_panels(scene, receiver, &panels, samples, rng);
         *light += from_bodies(scene, receiver, samples, rng);
     }
     if scene.sources.emitters.is_empty() {
+        return light;
+    }
+    let groups = groups_of(scene, &places);
+    let groups = groups.as_ref();
+    if groups.is_some_and(|groups| groups.all() == 0.0) {
         return light;
     }
     let near = near_emitters(scene, &places);
     let tile = Tile::new(scene, places.iter().map(link).collect(), 0);
     let refused = near.iter().map(|(number, near)| (*number, near.clone()));
     let rule = Rule { bound: f64::INFINITY, channels, orders: 0..1 };
-    let connected = connect(scene, points, some, &tile.refusing(refused), &rule);
+    let connected = shared.connect(scene, groups, &tile.refusing(refused), &rule);
     for (i, (receiver, rng)) in receivers.iter_mut().enumerate() {
         light[i] += if receiver.response.is_peaked() {
-            from_emitters(scene, receiver, samples, rng)
+            from_emitters(scene, receiver, groups, samples, rng)
         } else {
             let own: Vec<u32> = near.iter().filter(|(_, near)| near[i]).map(|(number, _)| *number).collect();
-            connected[i].sum * weight + from_some_emitters(scene, receiver, &own, samples, rng)
+            connected[i].sum * shared.weight + from_some_emitters(scene, receiver, &own, samples, rng)
         };
     }
     light
@@ -117,9 +163,15 @@ fn link(receiver: &Receiver) -> Link {
 
 /// The emitters that are too near to some of the receivers, with the receivers.
 fn near_emitters(scene: &Scene, receivers: &[Receiver]) -> Vec<(u32, Vec<bool>)> {
+    let empty = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    let (low, high) = receivers.iter().fold(empty, |(l, h), r| (l.min(r.position), h.max(r.position)));
     let near = |(number, emitter): (u32, &Emitter)| {
         let ([a, b, c], reach) = (emitter.corners, NEAR * NEAR * emitter.longest_edge_squared());
         let middle = (a + b + c) / 3.0;
+        // A look at the box around all of them: of many emitters few are near.
+        if middle.clamp(low, high).distance_squared(middle) > reach {
+            return None;
+        }
         let is_near = |r: &Receiver| r.position.distance_squared(middle) < reach;
         let near: Vec<bool> = receivers.iter().map(is_near).collect();
         near.contains(&true).then_some((number, near))
@@ -127,12 +179,16 @@ fn near_emitters(scene: &Scene, receivers: &[Receiver]) -> Vec<(u32, Vec<bool>)>
     scene.sources.numbered().filter_map(near).collect()
 }
 
-/// Light from point, spot and directional lights, times the responses.
-fn of_lights(scene: &Scene, receivers: &[Receiver]) -> Vec<Colour> {
+/// Light from the lights `asked` at `receivers`, at most a tile, times their responses \[lx or cd/m2\].
+pub fn of_lights(scene: &Scene, receivers: &[Receiver], asked: &[Asked]) -> Vec<Colour> {
     let mut sums = vec![Colour::BLACK; receivers.len()];
+    if asked.is_empty() {
+        return sums;
+    }
     let lifted: Vec<Vec3> = receivers.iter().map(|r| scene.geometry.lift(r.position, r.normal).as_vec3()).collect();
-    let points = Points::new(&scene.geometry, &lifted, scene.sources.lights.len());
-    for light in &scene.sources.lights {
+    let points = Points::new(&scene.geometry, &lifted, asked.len());
+    for &(number, weight) in asked {
+        let light = &scene.sources.lights[number];
         let arriving: Vec<_> = receivers.iter().map(|r| light.at(r.position)).collect();
         let mut seen: Lanes = [0; BUNDLES];
         for (i, (receiver, (_, w_in, across))) in receivers.iter().zip(&arriving).enumerate() {
@@ -152,7 +208,7 @@ fn of_lights(scene: &Scene, receivers: &[Receiver]) -> Vec<Colour> {
         for (i, (receiver, (_, w_in, across))) in receivers.iter().zip(&arriving).enumerate() {
             if seen[i / BUNDLE] >> (i % BUNDLE) & 1 == 1 {
                 let cosine = -receiver.normal.dot(*w_in);
-                sums[i] += *across * cosine * receiver.response.to(scene, receiver.normal, *w_in);
+                sums[i] += *across * (weight * cosine) * receiver.response.to(scene, receiver.normal, *w_in);
             }
         }
     }

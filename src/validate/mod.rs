@@ -9,6 +9,7 @@
 
 mod bounces;
 mod cavities;
+pub mod clipping;
 pub mod closed_forms;
 mod comparison;
 mod cube;
@@ -16,6 +17,8 @@ mod direct;
 mod document;
 pub mod experiment;
 mod form_factors;
+mod luminaires;
+mod openings;
 pub mod reference;
 pub mod scenes;
 pub mod sobolev;
@@ -80,7 +83,8 @@ impl Case {
 /// All cases, in order.
 pub fn cases() -> Vec<Case> {
     let themes = [direct::cases(), form_factors::cases(), cavities::cases(), bounces::cases()];
-    themes.into_iter().flatten().chain(cube::cases()).chain(sobolev::cases()).collect()
+    let themes = themes.into_iter().flatten().chain(cube::cases()).chain(sobolev::cases());
+    themes.chain(luminaires::cases()).chain(openings::cases()).collect()
 }
 
 /// The cases whose names contain `part`; all without it.

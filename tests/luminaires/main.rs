@@ -5,6 +5,7 @@
 mod gltf_builder;
 
 mod bad;
+mod meshes;
 mod naive;
 mod openings;
 mod reading;

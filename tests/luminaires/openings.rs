@@ -9,7 +9,7 @@ use lampyris::scene::Scene;
 use lampyris::transport::direct::from_panels;
 use lampyris::transport::receiver::{Receiver, Response, look};
 
-const SHAPES: [&str; 7] =
+pub const SHAPES: [&str; 7] =
     ["rectangle", "disc", "box", "cylinder_upright", "cylinder_along_c0", "cylinder_across_c0", "sphere"];
 
 fn random(name: &str) -> Generator {
@@ -24,7 +24,7 @@ fn askew(file: &str) -> Scene {
 }
 
 /// Mean of `samples` estimates of the illuminance, and the standard error of the mean \[lx\].
-fn sampled(samples: u32, mut estimate: impl FnMut() -> f64) -> (f64, f64) {
+pub fn sampled(samples: u32, mut estimate: impl FnMut() -> f64) -> (f64, f64) {
     let scores: Vec<f64> = (0..samples).map(|_| estimate()).collect();
     let n = f64::from(samples);
     let mean = scores.iter().sum::<f64>() / n;
@@ -51,7 +51,8 @@ fn a_lambertian_disc_is_exact_near_by_and_a_point_far_off() {
         // E = M r^2/(r^2 + d^2), M = flux over area.
         let exact = 100.0 / PI / (radius * radius + distance * distance);
         let receiver = meter(&disc, [0.0, -distance, 0.0], UP);
-        let (mean, error) = sampled(1024, || from_panels(&disc, &receiver, 64, &mut rng).luminance());
+        let (mean, error) =
+            sampled(1024, || from_panels(&disc, &receiver, disc.sources.panels_by_flux(), 64, &mut rng).luminance());
         assert!((mean - exact).abs() < 5.0 * error + 1e-4 * exact, "{distance} m: {mean} +- {error} lx, not {exact}");
         assert!(error < 5e-3 * exact, "{distance} m: {error} of {exact}");
         let as_point = lux(&point, [0.0, -distance, 0.0], UP);
@@ -62,7 +63,7 @@ fn a_lambertian_disc_is_exact_near_by_and_a_point_far_off() {
 }
 
 /// Area of a shape of the test files as seen along `w`, given in the axes length, width, aim \[m2\].
-fn shown(shape: &str, [x, y, z]: [f64; 3]) -> f64 {
+pub fn shown(shape: &str, [x, y, z]: [f64; 3]) -> f64 {
     let across = |a: f64, b: f64| (a * a + b * b).sqrt();
     match shape {
         "rectangle" => 0.6 * 0.3 * z.abs(),
@@ -118,7 +119,9 @@ fn far_off_an_opening_lights_as_a_point() {
         for position in [[0.0, -20.0, 3.0], [15.0, -10.0, -8.0], [4.0, 18.0, 6.0]] {
             let normal = position.map(|x: f64| -x);
             let receiver = meter(&scene, position, normal);
-            let (mean, error) = sampled(128, || from_panels(&scene, &receiver, 64, &mut rng).luminance());
+            let (mean, error) = sampled(128, || {
+                from_panels(&scene, &receiver, scene.sources.panels_by_flux(), 64, &mut rng).luminance()
+            });
             let expected = lux(&point, position, normal);
             assert!(
                 (mean - expected).abs() < 5.0 * error + 1e-3 * expected,
@@ -150,7 +153,14 @@ fn the_lux_on_the_walls_of_a_closed_box_sum_up_to_the_flux_of_an_opening() {
             position[axis] = side * size[axis];
             let mut normal = [0.0; 3];
             normal[axis] = 1.0 - 2.0 * side;
-            all * from_panels(&experiment.scene, &meter(&experiment.scene, position, normal), 1, &mut rng).luminance()
+            all * from_panels(
+                &experiment.scene,
+                &meter(&experiment.scene, position, normal),
+                experiment.scene.sources.panels_by_flux(),
+                1,
+                &mut rng,
+            )
+            .luminance()
         });
         let flux = experiment.scene.sources.flux();
         assert!((mean - flux).abs() < 5.0 * error, "{shape}: {mean} +- {error} lm, not {flux}");

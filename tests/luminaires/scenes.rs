@@ -327,7 +327,7 @@ fn lights_out_of_range_are_refused_by_field() {
         ),
         (format!("{source}kind = \"cos_power\"\ndirection = [0, 1, 0]\nexponent = -1.0\n"), "source[0].exponent = -1"),
         (format!("{source}kind = \"cos_power\"\ndirection = [0, 0, 0]\nexponent = 1.0\n"), "source[0].direction"),
-        (luminaire("full.ies", ""), "luminaire[0].position = (missing)"),
+        (luminaire("full.ies", ""), "luminaire[0].position = (missing): a position, a node or a mesh"),
         (luminaire("full.ies", "node = \"lamp\""), "luminaire[0].node = lamp: a node only with a scene"),
         (luminaire("full.ies", "position = [0, 0, 0]\nmultiplier = 0.0"), "luminaire[0].multiplier = 0"),
         (luminaire("full.ies", "position = [0, 0, 0]\ndimming = 1.5"), "luminaire[0].dimming = 1.5"),

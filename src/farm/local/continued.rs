@@ -12,17 +12,19 @@ use crate::geometry::kd_order;
 use crate::geometry::visibility::Scratch;
 use crate::photometry::Colour;
 use crate::random::Generator;
-use crate::transport::connection::{Connectors, Link, TILE};
+use crate::transport::connection::{Link, TILE};
 use crate::transport::continuation::{Continuation, continue_from, is_due};
 use crate::transport::neighbours::{GROUP, Neighbours};
 use crate::transport::receiver::Receiver;
-use crate::transport::shared::{Shared, direct_light};
+use crate::transport::shared::{LitPoints, Shared, direct_light};
 use rayon::prelude::*;
 use std::ops::Range;
 
 /// Histories that share a continuation of each receiver, where it has no neighbours to share points with and where it may have:
 /// chosen by measured figure of merit (docs/benchmarks.md).
 const HISTORIES_OF_A_PATH: [usize; 2] = [4, 16];
+/// Lights without extent that the points of continuations ask, where there are more: chosen by measured figure of merit.
+const LAMPS_OF_A_POINT: u64 = 8;
 
 /// A receiver that is continued, with its paths in this batch.
 struct Continued {
@@ -91,7 +93,7 @@ impl Block<'_> {
         &self,
         continued: &[Continued],
         paths: &[Path],
-        lit: &Connectors,
+        lit: &LitPoints,
         group: usize,
         histories: Range<usize>,
     ) -> Vec<Score> {
@@ -116,14 +118,14 @@ impl Block<'_> {
         &self,
         mut points: Vec<Point>,
         depth: u32,
-        (lit, group): (&Connectors, usize),
+        (lit, group): (&LitPoints, usize),
         light: &[Score],
     ) -> Vec<Link> {
         let counts = self.rule.orders.contains(&depth);
         let of_tile = |points: &mut [Point]| -> Vec<Link> {
             let mut there: Vec<_> = points.iter_mut().map(|(_, receiver, rng)| (*receiver, rng)).collect();
-            let what = (true, self.rule.channels);
-            let direct = direct_light(self.scene, &mut there, Shared::run(lit, group), 1, what);
+            let what = (LAMPS_OF_A_POINT, self.rule.channels);
+            let direct = direct_light(self.scene, &mut there, &Shared::run(lit, group), 1, what);
             let link = |((path, receiver, _), direct): (&Point, Colour)| Link {
                 owner: *path,
                 receiver: *receiver,

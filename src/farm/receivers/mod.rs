@@ -22,9 +22,10 @@ use crate::photometry::Colour;
 use crate::random::sobol::PointSet;
 use crate::random::{Domain, Generator, Stream};
 use crate::scene::Scene;
-use crate::transport::direct::from_lights;
 use crate::transport::eye::{Eye, Gaze, latitude};
+use crate::transport::lamps::all;
 use crate::transport::receiver::{Receiver, Response, Seen, look, look_at};
+use crate::transport::shared::of_lights;
 use horizon::Sight;
 
 /// One receiver set of a job, placed in a scene.
@@ -196,13 +197,20 @@ impl ReceiverSet {
         Ok(warnings)
     }
 
-    /// Direct light of bin `i` that is the same in every batch \[lx or cd/m2\]: of a lux-meter the light of sources
+    /// Direct light of `bins`, at most a tile, that is the same in every batch \[lx or cd/m2\]: of lux-meters the light of all sources
     /// without extent, NaN inside a solid; of a map 0, NaN where no direction of the bin is above the surface.
-    pub fn fixed_direct(&self, scene: &Scene, i: usize) -> f64 {
+    pub fn fixed_direct(&self, scene: &Scene, bins: &[u32]) -> Vec<f64> {
         match &self.bins {
-            Bins::Meters(meters) => meters[i].map_or(f64::NAN, |r| from_lights(scene, &r).luminance()),
-            Bins::Film { .. } if self.sights.get(i) == Some(&Sight::Below) => f64::NAN,
-            Bins::Film { .. } => 0.0,
+            Bins::Meters(meters) => {
+                let there: Vec<Receiver> = bins.iter().filter_map(|&bin| meters[bin as usize]).collect();
+                let mut light = of_lights(scene, &there, &all(scene)).into_iter().map(Colour::luminance);
+                let of = |&bin: &u32| meters[bin as usize].and_then(|_| light.next()).unwrap_or(f64::NAN);
+                bins.iter().map(of).collect()
+            }
+            Bins::Film { .. } => {
+                let below = |&bin: &u32| self.sights.get(bin as usize) == Some(&Sight::Below);
+                bins.iter().map(|bin| if below(bin) { f64::NAN } else { 0.0 }).collect()
+            }
         }
     }
 

@@ -10,15 +10,18 @@ use crate::photometry::Colour;
 use crate::random::Generator;
 use crate::random::sobol::PointSet;
 use crate::scene::Scene;
-use crate::transport::connection::Connectors;
 use crate::transport::direct::emitter_samples;
 use crate::transport::eye::{Eye, Gaze};
 use crate::transport::receiver::{Receiver, Seen, look_at};
-use crate::transport::shared::{Shared, TOGETHER, direct_light, lit_points};
+use crate::transport::shared::{LitPoints, Shared, TOGETHER, direct_light};
 
 /// Histories of a batch for each point of an emitter that its receivers share: chosen by measured figure of merit
 /// (docs/benchmarks.md).
 const HISTORIES_OF_A_POINT: u64 = 2;
+/// Histories of a batch for each of many lights without extent that the positions of a bin ask together, and the least
+/// number that one position asks: chosen in the same way.
+const HISTORIES_OF_A_LAMP: u64 = 1;
+const LEAST_LAMPS: u64 = 4;
 
 /// What the positions of one bin say in one batch.
 pub struct Sensed {
@@ -38,21 +41,21 @@ impl Sensed {
 
 impl ReceiverSet {
     /// The points of emitters that all receivers of the set share in `batch`, for each position in a bin.
-    pub fn lit_points(&self, scene: &Scene, batch: u64) -> Vec<Connectors> {
+    pub fn lit_points(&self, scene: &Scene, batch: u64) -> Vec<LitPoints> {
         let positions = u64::from(self.positions());
         let count = (self.histories / (HISTORIES_OF_A_POINT * positions)).max(1).next_power_of_two() as u32;
         (0..positions).map(|position| self.lit_points_of(scene, batch, position, count)).collect()
     }
 
     /// The points of emitters that the points of continuations share in `batch`: a run for each of `groups` paths.
-    pub fn lit_points_of_continuations(&self, scene: &Scene, batch: u64, groups: usize) -> Connectors {
+    pub fn lit_points_of_continuations(&self, scene: &Scene, batch: u64, groups: usize) -> LitPoints {
         let count = (groups.next_power_of_two() * TOGETHER) as u32;
         self.lit_points_of(scene, batch, u64::from(self.positions()), count)
     }
 
-    fn lit_points_of(&self, scene: &Scene, batch: u64, position: u64, count: u32) -> Connectors {
+    fn lit_points_of(&self, scene: &Scene, batch: u64, position: u64, count: u32) -> LitPoints {
         let index = batch * (u64::from(self.positions()) + 1) + position;
-        lit_points(scene, &PointSet::new(&self.emitters, index, count.ilog2()), count)
+        LitPoints::new(scene, PointSet::new(&self.emitters, index, count.ilog2()), count)
     }
 
     /// Positions in a bin and batch.
@@ -64,14 +67,7 @@ impl ReceiverSet {
     }
 
     /// Receivers of the bins of a tile in one batch, with their direct light; `shared` are the lit points of the batch.
-    pub fn sense(
-        &self,
-        scene: &Scene,
-        bins: &[u32],
-        batch: u64,
-        shared: &[Connectors],
-        channels: usize,
-    ) -> Vec<Sensed> {
+    pub fn sense(&self, scene: &Scene, bins: &[u32], batch: u64, shared: &[LitPoints], channels: usize) -> Vec<Sensed> {
         let generator = |&bin: &u32| self.stream.generator(batch * self.shape.bins() as u64 + u64::from(bin));
         let mut rngs: Vec<Generator> = bins.iter().map(generator).collect();
         match &self.bins {
@@ -86,12 +82,12 @@ impl ReceiverSet {
         bins: &[u32],
         meters: &[Option<Receiver>],
         rngs: &mut [Generator],
-        shared: &Connectors,
+        shared: &LitPoints,
         channels: usize,
     ) -> Vec<Sensed> {
         let receivers: Vec<Option<Receiver>> = bins.iter().map(|&bin| meters[bin as usize]).collect();
         // Their light from lights without extent is the same in every batch.
-        let light = self.light(scene, &receivers, rngs, shared, (false, channels));
+        let light = self.light(scene, &receivers, rngs, shared, (0, channels));
         let sensed = |(receiver, direct): (Option<Receiver>, Colour)| {
             // In a scene without reflection there is nothing to wait for beyond direct light.
             Sensed { direct, receiver, existed: receiver.is_some() && scene.reflects() }
@@ -105,16 +101,17 @@ impl ReceiverSet {
         bins: &[u32],
         eye: &Eye,
         rngs: &mut [Generator],
-        shared: &[Connectors],
+        shared: &[LitPoints],
         channels: usize,
     ) -> Vec<Sensed> {
         let positions = self.positions();
+        let lamps = (self.histories / (HISTORIES_OF_A_LAMP * u64::from(positions))).max(LEAST_LAMPS);
         let carrying: Vec<u32> = rngs.iter_mut().map(|rng| rng.below(positions)).collect();
         let mut sensed: Vec<Sensed> = bins.iter().map(|_| Sensed::nothing()).collect();
         for (stratum, shared) in (0..).zip(shared) {
             let seen = self.look(scene, bins, eye, stratum, rngs);
             let receivers: Vec<Option<Receiver>> = seen.iter().map(|s| s.receiver).collect();
-            let light = self.light(scene, &receivers, rngs, shared, (true, channels));
+            let light = self.light(scene, &receivers, rngs, shared, (lamps, channels));
             for (i, (seen, light)) in seen.iter().zip(light).enumerate() {
                 sensed[i].direct += seen.emitted + light;
                 sensed[i].existed |= seen.receiver.is_some();
@@ -155,13 +152,13 @@ impl ReceiverSet {
         scene: &Scene,
         receivers: &[Option<Receiver>],
         rngs: &mut [Generator],
-        shared: &Connectors,
-        what: (bool, usize),
+        shared: &LitPoints,
+        what: (u64, usize),
     ) -> Vec<Colour> {
         let samples = emitter_samples(self.histories).div_ceil(u64::from(self.positions()));
         let there = receivers.iter().zip(rngs).filter_map(|(r, rng)| Some(((*r)?, rng)));
         let mut there: Vec<(Receiver, &mut Generator)> = there.collect();
-        let mut light = direct_light(scene, &mut there, Shared::all(shared), samples, what).into_iter();
+        let mut light = direct_light(scene, &mut there, &Shared::all(shared), samples, what).into_iter();
         receivers.iter().map(|r| r.and_then(|_| light.next()).unwrap_or(Colour::BLACK)).collect()
     }
 }

@@ -65,8 +65,8 @@ fn a_lamp_gives_a_meter_on_it_nothing_and_the_plan_says_so() {
     // What the other lamp gives stays: cell [1, 0] lies below the first one.
     let way = DVec3::new(1.4, -1.0, 0.2);
     let expected = 100.0 / way.length_squared() * (1.0 / way.length());
-    let cell = sets[0].fixed_direct(&scene, 1);
+    let cell = sets[0].fixed_direct(&scene, &[1])[0];
     assert!((cell / expected - 1.0).abs() < 1e-12, "{cell} {expected}");
-    assert_eq!(sets[1].fixed_direct(&scene, 0), 0.0, "the other lamp is below the plane of this meter");
-    assert!(sets[2].fixed_direct(&scene, 0) > 9999.0, "a decimetre away all is as it was");
+    assert_eq!(sets[1].fixed_direct(&scene, &[0])[0], 0.0, "the other lamp is below the plane of this meter");
+    assert!(sets[2].fixed_direct(&scene, &[0])[0] > 9999.0, "a decimetre away all is as it was");
 }

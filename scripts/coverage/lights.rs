@@ -1,0 +1,81 @@
+//! Light that is sampled because there is much of it, or because it has an extent: many lights, many luminous areas, a luminaire with the
+//! opening of its file.
+
+use super::cases::{camera, measured, tables};
+use super::count::{Counted, count};
+use super::replicate::Kind;
+use lampyris::error::Result;
+use lampyris::job::Job;
+use lampyris::math::DVec3;
+use lampyris::scene::Model;
+use lampyris::scene::photometric_web::Photometry;
+use lampyris::validate::experiment::Experiment;
+use lampyris::validate::scenes::{UP, add_quad, closed_box, lambert, omni, point};
+
+/// Size of the hall \[m\].
+const HALL: DVec3 = DVec3::new(12.0, 3.0, 8.0);
+/// A downlight with a rectangular opening of 0.6 x 0.3 m.
+const WEB: &str = "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 7 1 1 2 0.3 0.6 0\n1 1 20\n0 15 30 45 60 75 90\n0\n\
+                   300 310 330 300 200 80 0\n";
+
+/// All cases, printed as they come.
+pub fn run(replicates: u64, mut done: impl FnMut(&[Counted])) -> Result<Vec<Counted>> {
+    let mut all = Vec::new();
+    for case in [many_points, many_areas, opening] {
+        let counted = case(replicates)?;
+        done(&counted);
+        all.extend(counted);
+    }
+    Ok(all)
+}
+
+/// A pixel of floor and wall together, a lux-meter at an edge and one in the middle, over `model` with the sources of `more`.
+fn hall(name: &str, model: Model, more: &str, n: u64) -> Result<Vec<Counted>> {
+    let job = tables("rqmc", 32, 32)
+        + &camera("view", [1.0, 1.5, 1.0], [8.0, 0.0, 6.0], 20.0, [1, 1])
+        + &point("near", [5.0, 0.0, 0.05], UP)
+        + &point("middle", [5.0, 0.0, 4.0], UP)
+        + more;
+    let experiment = Experiment::new(&job, model)?;
+    let wanted = [
+        ("pixel of the floor", Kind::Total(0, 0)),
+        ("E 5 cm from a wall", Kind::Total(1, 0)),
+        ("E in the middle", Kind::Total(2, 0)),
+        ("ratio of the two", Kind::Ratio(1, 2)),
+    ];
+    let quantities = measured(&experiment, &wanted);
+    Ok(count(name, &experiment, quantities, n))
+}
+
+/// Places below the ceiling, in columns and rows.
+fn places(columns: u32, rows: u32) -> impl Iterator<Item = DVec3> {
+    let share = |i: u32, count: u32| (f64::from(i) + 0.4) / f64::from(count);
+    let place = move |i: u32| DVec3::new(HALL.x * share(i % columns, columns), 2.8, HALL.z * share(i / columns, rows));
+    (0..columns * rows).map(place)
+}
+
+fn many_points(n: u64) -> Result<Vec<Counted>> {
+    let sources: String = places(12, 8).map(|place| omni(place.to_array(), 10.0)).collect();
+    hall("96 omnis in a hall, rqmc, 32 x 32", closed_box(HALL, &lambert(0.5, 0.0)), &sources, n)
+}
+
+fn many_areas(n: u64) -> Result<Vec<Counted>> {
+    let mut model = closed_box(HALL, &lambert(0.5, 0.0));
+    places(12, 8).for_each(|place| add_quad(&mut model, place, DVec3::X * 0.3, DVec3::Z * 0.3, lambert(0.0, 100.0)));
+    hall("96 luminous squares in a hall, rqmc, 32 x 32", model, "", n)
+}
+
+fn opening(n: u64) -> Result<Vec<Counted>> {
+    let mut model = closed_box(HALL, &lambert(0.5, 0.0));
+    let web = Photometry::parse("web", WEB.as_bytes())?;
+    for place in places(2, 1) {
+        let entry = format!(
+            "scene = \"hall\"\n[[luminaire]]\nfile = \"web\"\nposition = {:?}\nextent = \"opening\"\n{}",
+            place.to_array(),
+            point("p", [1.0; 3], UP)
+        );
+        let job = Job::parse(&entry, "hall")?;
+        model.hang(("hall", "luminaire[0]"), &job.luminaires[0], &web)?;
+    }
+    hall("two luminaires with openings in a hall, rqmc, 32 x 32", model, "", n)
+}
