@@ -175,6 +175,12 @@ pub fn cosine_hemisphere(u: DVec2) -> DVec3 {
     around_z((1.0 - u.x).sqrt(), u.y)
 }
 
+/// Point number `k` of a sequence that fills the unit square evenly from the point `start` on: its steps are the inverse powers of
+/// the plastic number.
+pub fn evenly(start: DVec2, k: u64) -> DVec2 {
+    (start + k as f64 * DVec2::new(0.754_877_666_246_692_8, 0.569_840_290_998_053_2)).fract()
+}
+
 /// Point of the unit disc, uniform in area, from a point of the unit square.
 pub fn disc(u: DVec2) -> DVec2 {
     let (sin, cos) = sin_cos(2.0 * PI * u.y);

@@ -4,8 +4,10 @@
 //! emission, so every history starts with the same luminous weight: the flux of all sources together.
 
 use super::body::Body;
+use super::environment::Environment;
 use super::light::Light;
 use super::panel::Panel;
+use super::sky::Sky;
 use crate::geometry::Geometry;
 use crate::math::{DVec3, PI, to_world};
 use crate::photometry::Colour;
@@ -85,6 +87,10 @@ pub struct Sources {
     body_flux: Vec<f64>,
     /// The same over the panels.
     panel_flux: Vec<f64>,
+    /// Light from outside, where there is a sky or an opening; parallel light then starts from there.
+    pub environment: Option<Environment>,
+    /// Running sum of what the ways of drawing light from outside are chosen in proportion to \[lm\].
+    environment_flux: Vec<f64>,
     /// Centre and radius of the sphere that parallel light must cover \[m\].
     covered: (DVec3, f64),
 }
@@ -107,12 +113,42 @@ impl Sources {
         let panel_flux = running_sum(panels.iter().map(|p| p.luminaire.flux()));
         let bodies: Vec<Body> = bodies.into_iter().filter(|b| lit(b.flux())).collect();
         let body_flux = running_sum(bodies.iter().map(Body::flux));
-        Sources { lights, emitters, panels, bodies, light_flux, emitter_flux, panel_flux, body_flux, covered }
+        Sources {
+            lights,
+            emitters,
+            panels,
+            bodies,
+            light_flux,
+            emitter_flux,
+            panel_flux,
+            body_flux,
+            covered,
+            environment: None,
+            environment_flux: Vec::new(),
+        }
+    }
+
+    /// The same sources and the light from outside.
+    pub(super) fn under(mut self, environment: Environment) -> Self {
+        let own = |light: &Light| match light {
+            Light::Directional { .. } => Colour::BLACK,
+            _ => light.flux(self.covered.1),
+        };
+        self.light_flux = running_sum(self.lights.iter().map(own));
+        self.environment_flux = running_sum(environment.fluxes().map(Colour::grey));
+        self.environment = Some(environment);
+        self
+    }
+
+    /// The sky, if there is one.
+    pub fn sky(&self) -> Option<&Sky> {
+        self.environment.as_ref()?.sky.as_ref()
     }
 
     /// Number of sources.
     pub fn len(&self) -> usize {
-        self.lights.len() + self.emitters.len() + self.panels.len() + self.bodies.len()
+        let sky = usize::from(self.sky().is_some());
+        self.lights.len() + self.emitters.len() + self.panels.len() + self.bodies.len() + sky
     }
 
     /// True in the dark.
@@ -120,9 +156,19 @@ impl Sources {
         self.len() == 0
     }
 
-    /// Luminous flux of all sources \[lm\].
+    /// Luminous flux of all sources \[lm\]; of those outside what falls on the scene and around it.
     pub fn flux(&self) -> f64 {
-        last(&self.light_flux) + last(&self.emitter_flux) + last(&self.panel_flux) + last(&self.body_flux)
+        let Some(environment) = &self.environment else { return self.started() };
+        let parallel = self.lights.iter().filter(|light| matches!(light, Light::Directional { .. }));
+        let outside: Colour = parallel.map(|light| light.flux(self.covered.1)).sum();
+        self.started() - last(&self.environment_flux) + outside.luminance() + environment.sky_flux()
+    }
+
+    /// Luminous weight with which a history starts, its mean where light comes from outside \[lm\]: the flux of all sources, but
+    /// with openings only about what comes through them.
+    pub fn started(&self) -> f64 {
+        let inside = last(&self.light_flux) + last(&self.emitter_flux) + last(&self.panel_flux) + last(&self.body_flux);
+        inside + last(&self.environment_flux)
     }
 
     /// Chooses a face of a panel by `u` in [0, 1), the panel in proportion to flux and the face to area: the two, and their
@@ -194,8 +240,10 @@ impl Sources {
 
     /// Starts a history. With a single source no number is drawn for the choice.
     pub fn emit(&self, geometry: &Geometry, rng: &mut Generator) -> Emission {
-        let mut target = if self.len() == 1 { 0.0 } else { rng.uniform() * self.flux() };
-        let kinds = [&self.light_flux, &self.emitter_flux, &self.panel_flux, &self.body_flux];
+        let kinds = [&self.light_flux, &self.emitter_flux, &self.panel_flux, &self.body_flux, &self.environment_flux];
+        let started = self.started();
+        let alone = kinds.iter().map(|sums| sums.len()).sum::<usize>() == 1;
+        let mut target = if alone { 0.0 } else { rng.uniform() * started };
         // Rounding may leave a rest behind the last source.
         let mut chosen = kinds.iter().rposition(|sums| !sums.is_empty()).expect("histories start where there is light");
         for (kind, sums) in kinds.iter().enumerate().take(chosen) {
@@ -213,10 +261,14 @@ impl Sources {
             }
             1 => (emit_triangle(&self.emitters[number], geometry, rng), self.emitters[number].flux()),
             2 => (self.panels[number].emit(geometry, rng), self.panels[number].luminaire.flux()),
+            4 => {
+                let outside = self.environment.as_ref().expect("ways to draw its light belong to an environment");
+                return outside.emit(number, started, rng);
+            }
             _ => (self.bodies[number].emit(geometry, rng), self.bodies[number].flux()),
         };
         // flux over the probability of the choice: the colour of the source, the luminous flux of all.
-        Emission { origin, direction, weight: flux * (self.flux() / flux.luminance()) }
+        Emission { origin, direction, weight: flux * (started / flux.luminance()) }
     }
 }
 

@@ -48,6 +48,7 @@ pub mod eye;
 pub mod receiver;
 pub mod reverse;
 pub mod shared;
+pub mod sky;
 mod spherical_triangle;
 mod totals;
 pub mod trajectory;
