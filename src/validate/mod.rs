@@ -12,6 +12,7 @@ mod cavities;
 pub mod closed_forms;
 mod comparison;
 mod cube;
+pub mod daylight;
 mod direct;
 mod document;
 pub mod experiment;
@@ -80,7 +81,7 @@ impl Case {
 /// All cases, in order.
 pub fn cases() -> Vec<Case> {
     let themes = [direct::cases(), form_factors::cases(), cavities::cases(), bounces::cases()];
-    themes.into_iter().flatten().chain(cube::cases()).chain(sobolev::cases()).collect()
+    themes.into_iter().flatten().chain(cube::cases()).chain(sobolev::cases()).chain(daylight::cases()).collect()
 }
 
 /// The cases whose names contain `part`; all without it.

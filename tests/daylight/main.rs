@@ -10,21 +10,14 @@ mod sources;
 
 use lampyris::math::{DVec3, PI};
 use lampyris::scene::{Model, Surface};
-use lampyris::validate::scenes::{add_quad, add_quad_with_hole, box_walls};
+use lampyris::validate::daylight::{self, opening};
 
 /// A room of 4 x 3 x 5 m with the insides of its walls like `surface`, and a hole in the wall z = 0 or in the ceiling.
 pub fn room(hole: Hole, surface: &Surface) -> Model {
-    let mut model = Model::default();
-    for (i, [origin, u, v]) in box_walls(DVec3::new(4.0, 3.0, 5.0)).into_iter().enumerate() {
-        match (i, hole) {
-            (4, Hole::Facade) => {
-                add_quad_with_hole(&mut model, [origin, u, v], [0.25, 0.75], [1.0 / 3.0, 0.8], surface)
-            }
-            (3, Hole::Roof) => add_quad_with_hole(&mut model, [origin, u, v], [0.25, 0.5], [0.4, 0.6], surface),
-            _ => add_quad(&mut model, origin, u, v, surface.clone()),
-        }
+    match hole {
+        Hole::Facade => daylight::room(4, [0.25, 0.75], [1.0 / 3.0, 0.8], surface),
+        Hole::Roof => daylight::room(3, [0.25, 0.5], [0.4, 0.6], surface),
     }
-    model
 }
 
 /// Where the room is open.
@@ -47,26 +40,13 @@ impl Hole {
 
     /// As `[[opening]]`.
     pub fn opening(self) -> String {
-        let [origin, u, v] = self.rectangle();
-        let corners = [origin, origin + u, origin + u + v, origin + v].map(|p| p.to_array());
-        format!("[[opening]]\ncorners = {corners:?}\n")
+        opening(self.rectangle())
     }
 }
 
-/// Illuminance at `point` through a rectangle, by the luminance that comes from beyond it along each unit vector: midpoints.
-pub fn through([origin, u, v]: [DVec3; 3], point: DVec3, normal: DVec3, luminance: impl Fn(DVec3) -> f64) -> f64 {
-    let steps = 400;
-    let (across, n) = (u.cross(v), f64::from(steps));
-    let mut sum = 0.0;
-    for i in 0..steps {
-        for j in 0..steps {
-            let y = origin + (f64::from(i) + 0.5) / n * u + (f64::from(j) + 0.5) / n * v;
-            let way = y - point;
-            let (d2, w) = (way.length_squared(), way.normalize());
-            sum += luminance(w) * w.dot(normal).max(0.0) * across.dot(w).abs() / (d2 * n * n);
-        }
-    }
-    sum
+#[test]
+fn the_battery() {
+    common::battery::assert_theme("daylight/");
 }
 
 /// A sky of `model` scaled by the luminance of its zenith, and what else its table says.

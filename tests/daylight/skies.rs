@@ -149,7 +149,7 @@ fn directions_are_drawn_with_the_density_that_is_evaluated_and_nearly_as_the_lum
                 boxes += 1.0;
             }
         }
-        let z = (chi - boxes) / (2.0 * boxes as f64).sqrt();
+        let z = (chi - boxes) / (2.0 * boxes).sqrt();
         assert!((all - 1.0).abs() < 2e-3, "{text}: the density integrates to {all}");
         assert!(z.abs() < 5.0, "{text}: chi-square {chi} in {boxes} boxes");
         if above.is_none() {
