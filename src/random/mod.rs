@@ -102,6 +102,7 @@ fn mix(mut z: u64) -> u64 {
 /// choice of the source    1    (none with a single source; every emissive triangle is one)
 /// omni, spot, parallel    2    direction, or place in the beam
 /// luminaire with extent   2+1+2  direction; face, point of it
+/// sky                     2+2  direction; place across it or in an opening
 /// emissive triangle       2+2  point, direction; 1 between them for the side, where both sides emit
 /// Lambert reflection      2    direction
 /// glossy reflection       1+2  part, direction; none for the direction of a mirror

@@ -65,7 +65,8 @@ struct Line {
 }
 
 impl Environment {
-    /// The sky of `job` and the parallel ones of `lights`, and the openings; `None` where neither the one nor the last is there.
+    /// The sky of `job` and the parallel ones of `lights`, and the openings; `None` without a sky, where there is not both of
+    /// the others.
     pub(super) fn new(
         sky: Option<Sky>,
         lights: &[Light],
@@ -73,19 +74,20 @@ impl Environment {
         offset: DVec3,
         geometry: &Geometry,
     ) -> Option<Environment> {
-        if sky.is_none() && openings.is_empty() {
-            return None;
-        }
-        let corner = |&p: &[f64; 3]| DVec3::from(p) + offset;
-        let opening = |o: &job::Opening| Opening::new(&o.corners.iter().map(corner).collect::<Vec<_>>());
         let parallel = lights.iter().filter_map(|light| match light {
             Light::Directional { direction, illuminance } => Some((*direction, *illuminance)),
             _ => None,
         });
+        let parallel: Vec<_> = parallel.collect();
+        if sky.is_none() && (openings.is_empty() || parallel.is_empty()) {
+            return None;
+        }
+        let corner = |&p: &[f64; 3]| DVec3::from(p) + offset;
+        let opening = |o: &job::Opening| Opening::new(&o.corners.iter().map(corner).collect::<Vec<_>>());
         let mut all = Environment {
             sky,
             openings: openings.iter().map(opening).collect(),
-            parallel: parallel.collect(),
+            parallel,
             starts: Vec::new(),
             covered: geometry.bounding_sphere(),
         };

@@ -176,6 +176,9 @@ impl Scene {
             sources = sources.under(environment);
         }
         let mut warnings = model.warnings;
+        if sources.environment.is_none() && !job.openings.is_empty() {
+            warnings.push("each [[opening]] ignored: there is neither a sky nor parallel light".to_owned());
+        }
         if sources.lights.len() < given {
             let dark = given - sources.lights.len();
             warnings

@@ -3,6 +3,8 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod bad;
+mod factor;
 mod light;
 mod rooms;
 mod skies;
