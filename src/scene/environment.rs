@@ -171,7 +171,8 @@ impl Environment {
         let (center, radius) = self.covered;
         let origin = line.point + (2.0 * radius - (line.point - center).dot(line.towards)) * line.towards;
         let weight = if density > 0.0 { bright * (all / density) } else { Colour::BLACK };
-        Emission { origin, direction: -line.towards, weight }
+        let emphasis = f64::min(1.0, all / weight.luminance());
+        Emission { origin, direction: -line.towards, weight, emphasis }
     }
 
     fn draw(&self, start: &Start, rng: &mut Generator) -> Line {

@@ -23,7 +23,7 @@ pub use body::{Body, BodyPoint, in_cone};
 pub use environment::Environment;
 pub use light::Light;
 pub use nodes::{Node, Nodes};
-pub use opening::Opening;
+pub use opening::{Aim, Opening};
 pub use panel::{Extended, Panel};
 pub use reflectance::{LawInLanes, Reflectance, Scattered, weight_over_tolerated, weights_over_tolerated};
 pub use sky::Sky;
@@ -233,6 +233,11 @@ impl Scene {
             Some((panel, _)) => panel.luminance(w),
             None => self.surface(hit.primitive).emission,
         }
+    }
+
+    /// Where daylight enters; none without daylight.
+    pub fn openings(&self) -> &[Opening] {
+        self.sources.environment.as_ref().map_or(&[], |environment| &environment.openings)
     }
 
     /// Luminance of what lies beyond all surfaces in the direction of the unit vector `w` \[cd/m2\].

@@ -1,6 +1,6 @@
 //! Flat convex polygons through which daylight enters a scene: they are no surfaces, only places to aim at.
 
-use crate::math::{DVec2, DVec3};
+use crate::math::{DVec2, DVec3, PI};
 
 /// A window or skylight.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,5 +53,61 @@ impl Opening {
         let next = self.corners.iter().cycle().skip(1);
         let inside = |(&a, &b): (&DVec3, &DVec3)| self.normal.dot((b - a).cross(p - a)) >= 0.0;
         self.corners.iter().zip(next).all(inside).then_some(distance)
+    }
+}
+
+impl Opening {
+    /// About the share that it takes of what a small matt surface at `position` with the unit normal `normal` sends out: nothing is
+    /// asked for what stands between.
+    pub fn share_of(&self, position: DVec3, normal: DVec3) -> f64 {
+        let way = self.center - position;
+        let d2 = way.length_squared();
+        let cosines = way.dot(normal).max(0.0) * way.dot(self.normal).abs() / d2.max(f64::MIN_POSITIVE);
+        self.area * cosines / (PI * d2 + self.area)
+    }
+}
+
+/// Directions from a point to openings, each chosen about in proportion to its solid angle.
+#[derive(Debug)]
+pub struct Aim<'a> {
+    openings: &'a [Opening],
+    from: DVec3,
+    /// Running sum of their probabilities.
+    chosen: Vec<f64>,
+}
+
+impl<'a> Aim<'a> {
+    /// From the point `from` to `openings`.
+    pub fn new(openings: &'a [Opening], from: DVec3) -> Self {
+        let size = |opening: &Opening| {
+            let way = opening.center - from;
+            let d2 = way.length_squared();
+            let cosine = opening.normal.dot(way).abs() / d2.sqrt().max(f64::MIN_POSITIVE);
+            opening.area * (0.1 + cosine) / (d2 + opening.area)
+        };
+        let all: f64 = openings.iter().map(size).sum();
+        let add = |sum: &mut f64, opening: &Opening| {
+            *sum += size(opening) / all;
+            Some(*sum)
+        };
+        Aim { openings, from, chosen: openings.iter().scan(0.0, add).collect() }
+    }
+
+    /// The direction that `choice` in [0, 1) and `u` draw, one opening at least; zero from a point of the opening itself.
+    pub fn direction(&self, choice: f64, u: DVec2) -> DVec3 {
+        let number = self.chosen.partition_point(|&sum| sum <= choice).min(self.openings.len() - 1);
+        (self.openings[number].point(u) - self.from).normalize_or_zero()
+    }
+
+    /// Density with which [`Aim::direction`] draws the unit vector `v` \[1/sr\]: 0 where no opening lies.
+    pub fn density(&self, v: DVec3) -> f64 {
+        let (mut density, mut before) = (0.0, 0.0);
+        for (opening, &sum) in self.openings.iter().zip(&self.chosen) {
+            if let Some(distance) = opening.crossing(self.from, v).filter(|d| *d > 0.0) {
+                density += (sum - before) * distance * distance / (opening.area * opening.normal.dot(v).abs());
+            }
+            before = sum;
+        }
+        density
     }
 }

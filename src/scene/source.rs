@@ -66,6 +66,8 @@ pub struct Emission {
     pub direction: DVec3,
     /// W_1, the flux weight with which it arrives at the first vertex \[lm\].
     pub weight: Colour,
+    /// How much more often than in proportion to flux it is drawn, at most 1: small for what comes beside the openings of daylight.
+    pub emphasis: f64,
 }
 
 /// All sources, with the choice in proportion to flux.
@@ -268,7 +270,7 @@ impl Sources {
             _ => (self.bodies[number].emit(geometry, rng), self.bodies[number].flux()),
         };
         // flux over the probability of the choice: the colour of the source, the luminous flux of all.
-        Emission { origin, direction, weight: flux * (started / flux.luminance()) }
+        Emission { origin, direction, weight: flux * (started / flux.luminance()), emphasis: 1.0 }
     }
 }
 

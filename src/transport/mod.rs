@@ -38,6 +38,7 @@
 //!
 //! Transport does not know files, threads, shards, how many histories run, nor the shape of a picture.
 
+mod aimed;
 mod bodies;
 pub mod connection;
 mod connectors;

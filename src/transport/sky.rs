@@ -16,7 +16,7 @@ use crate::geometry::Ray;
 use crate::math::{DVec2, DVec3};
 use crate::photometry::Colour;
 use crate::random::{Generator, evenly};
-use crate::scene::{Opening, Scene, Sky};
+use crate::scene::{Aim, Opening, Scene, Sky};
 
 /// c, the share of directions drawn from the whole sky where there are openings.
 const WHOLE: f64 = 0.25;
@@ -45,36 +45,20 @@ pub fn from_sky(scene: &Scene, receiver: &Receiver, samples: u64, rng: &mut Gene
 struct View<'a> {
     scene: &'a Scene,
     sky: &'a Sky,
-    openings: &'a [Opening],
     receiver: &'a Receiver,
     /// Its lifted point.
     from: DVec3,
-    /// Running sum of the probabilities of the openings.
-    chosen: Vec<f64>,
+    aim: Aim<'a>,
+    /// c of this receiver.
+    whole: f64,
 }
 
 impl<'a> View<'a> {
     fn new(scene: &'a Scene, sky: &'a Sky, openings: &'a [Opening], receiver: &'a Receiver) -> Self {
         let from = scene.geometry.lift(receiver.position, receiver.normal);
-        // About the solid angle of each.
-        let size = |opening: &Opening| {
-            let way = opening.center - from;
-            let d2 = way.length_squared();
-            opening.area * (0.1 + opening.normal.dot(way).abs() / d2.sqrt().max(f64::MIN_POSITIVE))
-                / (d2 + opening.area)
-        };
-        let all: f64 = openings.iter().map(size).sum();
-        let add = |sum: &mut f64, opening: &Opening| {
-            *sum += size(opening) / all;
-            Some(*sum)
-        };
-        let chosen = openings.iter().scan(0.0, add).collect();
-        View { scene, sky, openings, receiver, from, chosen }
-    }
-
-    /// c of this receiver.
-    fn whole(&self) -> f64 {
-        if self.openings.is_empty() { 1.0 } else { WHOLE }
+        let aim = Aim::new(openings, from);
+        let whole = if openings.is_empty() { 1.0 } else { WHOLE };
+        View { scene, sky, receiver, from, aim, whole }
     }
 
     /// Directions drawn towards the sky, below the receiver's plane left out.
@@ -86,27 +70,15 @@ impl<'a> View<'a> {
 
     /// The direction that `choice` in [0, 1) and `u` draw; zero where an opening has none.
     fn direction(&self, choice: f64, u: DVec2) -> DVec3 {
-        let whole = self.whole();
-        if choice < whole {
+        if choice < self.whole {
             return self.sky.sample_above(self.receiver.normal, u);
         }
-        let choice = (choice - whole) / (1.0 - whole);
-        let number = self.chosen.partition_point(|&sum| sum <= choice).min(self.openings.len() - 1);
-        (self.openings[number].point(u) - self.from).normalize_or_zero()
+        self.aim.direction((choice - self.whole) / (1.0 - self.whole), u)
     }
 
     /// q(v) \[1/sr\].
     fn density(&self, v: DVec3) -> f64 {
-        let mut through = 0.0;
-        let mut before = 0.0;
-        for (opening, &sum) in self.openings.iter().zip(&self.chosen) {
-            if let Some(distance) = opening.crossing(self.from, v).filter(|d| *d > 0.0) {
-                through += (sum - before) * distance * distance / (opening.area * opening.normal.dot(v).abs());
-            }
-            before = sum;
-        }
-        let whole = self.whole();
-        whole * self.sky.density_above(self.receiver.normal, v) + (1.0 - whole) * through
+        self.whole * self.sky.density_above(self.receiver.normal, v) + (1.0 - self.whole) * self.aim.density(v)
     }
 
     /// What an unobstructed direction that was drawn counts.

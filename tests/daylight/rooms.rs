@@ -3,8 +3,9 @@
 use crate::common::{Case, Comparison, Estimate, assert_all, compare, difference};
 use crate::{Hole, room, sky};
 use lampyris::math::DVec3;
+use lampyris::scene::Surface;
 use lampyris::validate::daylight::through;
-use lampyris::validate::scenes::{lambert, point, run, spot_camera};
+use lampyris::validate::scenes::{add_quad, lambert, point, run, spot_camera};
 
 const UP: [f64; 3] = [0.0, 1.0, 0.0];
 
@@ -53,7 +54,11 @@ fn local_and_reverse_agree_in_a_room_with_a_window_whatever_openings_are_drawn()
         "north = [0, 0, 1]\nground_reflectance = 0.2\n\
          [sky.sun]\nazimuth_degrees = 150\nelevation_degrees = 40\nilluminance = 20000\n",
     );
-    let model = room(Hole::Facade, &lambert(0.6, 0.0));
+    let mut model = room(Hole::Facade, &lambert(0.6, 0.0));
+    // A bright wall across the street, in the sun behind it, and a pavement: light enters by way of them, too.
+    let both = Surface { double_sided: true, ..lambert(0.7, 0.0) };
+    add_quad(&mut model, DVec3::new(-2.0, -1.0, -6.0), DVec3::X * 8.0, DVec3::Y * 3.5, both.clone());
+    add_quad(&mut model, DVec3::new(-2.0, -1.0, -0.1), DVec3::X * 8.0, DVec3::NEG_Z * 5.9, both);
     let of = |estimator: &str, histories: u32, openings: &str| {
         let run = format!("{}[transport]\nestimator = \"{estimator}\"\n", run(histories, 32));
         Case::new(&(run + &daylight + openings + &receivers()), model.clone()).values()
