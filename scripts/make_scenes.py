@@ -159,7 +159,7 @@ def office():
     gltf.surface("reveals", reveals, wall)
     gltf.surface("outside", [*outside, *others], grey("outside 0.3", 0.3))
     gltf.surface("desk", [*top, desk["-y"]], lambert("oak", (0.5, 0.38, 0.24)))
-    building = box((-9.0, -4.0, -25.0), (5.0, 5.0, -17.0))
+    building = box((-9.0, -4.0, -25.0), (5.0, 3.2, -17.0))
     gltf.surface("building", list(building.values()), lambert("brick", (0.4, 0.25, 0.2)))
     gltf.camera("camera", (3.5, 1.6, -0.4), (1.4, 1.15, -5.0), math.pi / 3.0)
     return gltf.bytes()

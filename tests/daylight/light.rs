@@ -107,6 +107,6 @@ fn glossy_surfaces_reflect_the_sky_as_reverse_paths_find_it() {
         let run = format!("{}[transport]\nestimator = \"{estimator}\"\n", run(histories, 64));
         Case::new(&(run + &job), model.clone()).values()
     };
-    let pairs = of("local", 16384).into_iter().zip(of("reverse", 32768)).enumerate();
+    let pairs = of("local", 4096).into_iter().zip(of("reverse", 8192)).enumerate();
     assert_all(&pairs.map(|(i, (a, b))| difference(format!("camera {i}"), a, b)).collect::<Vec<_>>());
 }

@@ -31,12 +31,9 @@ fn openings_change_no_mean_of_the_direct_light() {
     assert_all(&all);
 }
 
-/// Meters and small cameras in a bright room.
+/// A meter beside the patch of sun, and a pixel on a wall.
 fn receivers() -> String {
-    point("desk", [2.0, 0.8, 1.5], UP)
-        + &point("back", [1.0, 0.8, 4.0], [0.0, 1.0, -0.3])
-        + &spot_camera("wall", [2.0, 1.5, 2.5], [4.0, 1.2, 3.0], UP)
-        + &spot_camera("floor", [2.0, 1.5, 4.5], [1.8, 0.0, 2.0], UP)
+    point("desk", [0.7, 0.8, 1.5], UP) + &spot_camera("wall", [2.0, 1.5, 2.5], [4.0, 1.2, 3.0], UP)
 }
 
 fn pairs(what: &str, a: &[Estimate], b: &[Estimate]) -> Vec<Comparison> {
@@ -44,7 +41,7 @@ fn pairs(what: &str, a: &[Estimate], b: &[Estimate]) -> Vec<Comparison> {
     a.iter().zip(b).enumerate().map(pair).collect()
 }
 
-/// Sun and sky into a bright room: paths that find the sky by leaving, trajectories with and without openings, whole or in parts.
+/// Sun and sky into a bright room: paths that find the sky by leaving, trajectories with and without openings, right or wrong.
 #[test]
 fn local_and_reverse_agree_in_a_room_with_a_window_whatever_openings_are_drawn() {
     // The window looks south: north is +Z.
@@ -52,24 +49,24 @@ fn local_and_reverse_agree_in_a_room_with_a_window_whatever_openings_are_drawn()
         "12",
         2000.0,
         "north = [0, 0, 1]\nground_reflectance = 0.2\n\
-         [sky.sun]\nazimuth_degrees = 150\nelevation_degrees = 40\nilluminance = 20000\n",
+         [sky.sun]\nazimuth_degrees = 150\nelevation_degrees = 40\nilluminance = 3000\n",
     );
-    let mut model = room(Hole::Facade, &lambert(0.6, 0.0));
+    let mut model = room(Hole::Facade, &lambert(0.4, 0.0));
     // A bright wall across the street, in the sun behind it, and a pavement: light enters by way of them, too.
-    let both = Surface { double_sided: true, ..lambert(0.7, 0.0) };
+    let both = Surface { double_sided: true, ..lambert(0.5, 0.0) };
     add_quad(&mut model, DVec3::new(-2.0, -1.0, -6.0), DVec3::X * 8.0, DVec3::Y * 3.5, both.clone());
     add_quad(&mut model, DVec3::new(-2.0, -1.0, -0.1), DVec3::X * 8.0, DVec3::NEG_Z * 5.9, both);
     let of = |estimator: &str, histories: u32, openings: &str| {
         let run = format!("{}[transport]\nestimator = \"{estimator}\"\n", run(histories, 32));
         Case::new(&(run + &daylight + openings + &receivers()), model.clone()).values()
     };
-    let reverse = of("reverse", 16384, "");
-    let opened = of("local", 4096, &Hole::Facade.opening());
-    // Half of the window, and one that is nowhere.
-    let wrong = "[[opening]]\ncorners = [[1, 1, 0], [2, 1, 0], [2, 2.4, 0], [1, 2.4, 0]]\n\
+    let reverse = of("reverse", 32768, "");
+    let opened = of("local", 8192, &Hole::Facade.opening());
+    // One before the whole wall, off its plane and larger, and one that is nowhere.
+    let wrong = "[[opening]]\ncorners = [[0.5, 0.5, -0.3], [3.5, 0.5, -0.3], [3.5, 2.8, -0.1], [0.5, 2.8, -0.1]]\n\
                  [[opening]]\ncorners = [[0, 5, 0], [1, 5, 0], [1, 5, 3]]\n";
     let mut all = pairs("local, reverse", &opened, &reverse);
-    all.extend(pairs("whole, half", &opened[..3], &of("local", 32768, wrong)[..3]));
+    all.extend(pairs("right, wrong", &opened, &of("local", 8192, wrong)));
     all.extend(pairs("with, without", &opened, &of("local", 32768, "")));
     assert_all(&all);
 }
