@@ -184,6 +184,11 @@ impl Scene {
             warnings
                 .push(format!("{dark} of {given} lights without flux ignored: dark, no cone, or nothing to shine on"));
         }
+        if job.sky.as_ref().is_some_and(|sky| sky.daylight_factor) && sources.len() > 1 {
+            let others = sources.len() - 1;
+            warnings
+                .push(format!("daylight factors contain the light of {others} other sources, those of the scene file"));
+        }
         if sources.is_empty() {
             return Err(Error::input("scene", "sources", "none", "at least one light or emissive surface"));
         }

@@ -85,6 +85,10 @@ fn a_sky_needs_a_scene_with_an_end_and_openings_need_daylight() {
     assert!(said(sky).contains("at least one bounded surface"));
     let mut quad = Model::default();
     add_quad(&mut quad, DVec3::ZERO, DVec3::X, DVec3::Y, lambert(0.5, 0.0));
+    let mut lit = quad.clone();
+    add_quad(&mut lit, DVec3::Z, DVec3::X, DVec3::Y, lambert(0.5, 1.0));
+    let lit = built(&(sky.to_owned() + "daylight_factor = true\n"), lit).unwrap();
+    assert!(lit.warnings.iter().any(|w| w.contains("2 other sources")), "{:?}", lit.warnings);
     let opening = "[[opening]]\ncorners = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]\n";
     let idle = built(&(opening.to_owned() + &omni([0.0, 0.0, 1.0], 1.0)), quad).unwrap();
     assert!(idle.warnings.iter().any(|w| w.contains("[[opening]] ignored")), "{:?}", idle.warnings);

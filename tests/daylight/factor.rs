@@ -11,8 +11,8 @@ fn the_report_gives_daylight_factors_of_grids_and_points() {
     fs::copy(root.join("scenes/office.glb"), folder.path().join("office.glb")).unwrap();
     let text = fs::read_to_string(root.join("jobs/daylight.toml")).unwrap().replace("../scenes/", "");
     // The shipped job with a thumbnail for its picture.
-    let text = text.replace("batches = 64", "batches = 16").replace("width = 256", "width = 8");
-    fs::write(folder.path().join("job.toml"), text.replace("height = 192", "height = 6")).unwrap();
+    let text = text.replace("batches = 64", "batches = 16").replace("width = 192", "width = 8");
+    fs::write(folder.path().join("job.toml"), text.replace("height = 192", "height = 8")).unwrap();
     let mut run = Command::new(env!("CARGO_BIN_EXE_lampyris"));
     let output = run.args(["run", "job.toml", "-o", "out"]).current_dir(folder.path()).output().unwrap();
     let said = String::from_utf8(output.stdout).unwrap();
