@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes the scenes that ship, scenes/{room,cornell,furnace,figure2}.glb, bit for bit the same on every machine.
+"""Writes the scenes that ship, scenes/{room,cornell,furnace,figure2,office}.glb, bit for bit the same on every machine.
 
     scripts/make_scenes.py            write them
     scripts/make_scenes.py --check    compare them with the files that are there; exit 1 where one differs
@@ -26,7 +26,7 @@ SCENES = Path(__file__).resolve().parent.parent / "scenes"
 def main():
     check = parse_arguments(sys.argv[1:])
     wrong = 0
-    for name, build in [("room", room), ("cornell", cornell), ("furnace", furnace), ("figure2", figure2)]:
+    for name, build in [("room", room), ("cornell", cornell), ("furnace", furnace), ("figure2", figure2), ("office", office)]:
         path, content = SCENES / f"{name}.glb", build()
         if not check:
             path.write_bytes(content)
@@ -131,6 +131,37 @@ def furnace():
     gltf = Gltf("White furnace")
     material = emitting(grey("wall 0.5, emitting 1 lm/m2", 0.5), (1.0, 1.0, 1.0), 1.0 / math.pi)
     gltf.surface("walls", walls, material)
+    return gltf.bytes()
+
+
+def office():
+    """A room of 4 x 2.8 x 5 m in walls of 0.3 m, a window of 2.8 x 1.5 m in the wall at z = -5, a desk; across the street a building."""
+    hall, shell = box((0.0, 0.0, -5.0), (4.0, 2.8, 0.0)), box((-0.3, -0.3, -5.3), (4.3, 3.1, 0.3))
+    desk = box((1.0, 0.0, -3.6), (2.6, 0.72, -2.8))
+    # The hole through the wall: its ends are those of the holes in both faces of the wall.
+    hole = box((0.6, 0.9, -5.3), (3.4, 2.4, -5.0))
+    inside = ring(reverse(hall["-z"]), hole["+z"])
+    outside = ring(shell["-z"], hole["-z"])
+    reveals = [reverse(hole[side]) for side in ("-x", "+x", "-y", "+y")]
+    floor = ring(reverse(hall["-y"]), reverse(desk["-y"]))
+    walls = [reverse(hall[side]) for side in ("-x", "+x", "+z")]
+    others = [shell[side] for side in ("-x", "+x", "-y", "+y", "+z")]
+    top = [desk[side] for side in ("-x", "+x", "+y", "-z", "+z")]
+    solid = [*inside, *outside, *reveals, *floor, *walls, reverse(hall["+y"]), *others, *top]
+    check_closed(solid, 4.6 * 3.4 * 5.6 - 4.0 * 2.8 * 5.0 - 2.8 * 1.5 * 0.3 + 1.6 * 0.72 * 0.8)
+
+    gltf = Gltf("Office with a window")
+    wall = grey("wall 0.6", 0.6)
+    gltf.surface("floor", floor, grey("floor 0.3", 0.3))
+    gltf.surface("ceiling", [reverse(hall["+y"])], grey("ceiling 0.8", 0.8))
+    gltf.surface("walls", walls, wall)
+    gltf.surface("window wall", inside, wall)
+    gltf.surface("reveals", reveals, wall)
+    gltf.surface("outside", [*outside, *others], grey("outside 0.3", 0.3))
+    gltf.surface("desk", [*top, desk["-y"]], lambert("oak", (0.5, 0.38, 0.24)))
+    building = box((-9.0, -4.0, -25.0), (5.0, 3.2, -17.0))
+    gltf.surface("building", list(building.values()), lambert("brick", (0.4, 0.25, 0.2)))
+    gltf.camera("camera", (3.5, 1.6, -0.4), (1.4, 1.15, -5.0), math.pi / 3.0)
     return gltf.bytes()
 
 

@@ -54,7 +54,7 @@
 //! | 3 | [`job`] | the job file, every value checked | scenes, threads |
 //! | 3 | [`geometry`] | closest hit, mutual visibility | light, reflectance, pixels |
 //! | 4 | [`tally`] | scores of a batch, moments, statistics | what it counts, and where |
-//! | 4 | [`scene`] | surfaces, sources, photometric webs, laws of reflection, glTF | receivers, seeds |
+//! | 4 | [`scene`] | surfaces, sources, skies, photometric webs, laws of reflection, glTF | receivers, seeds |
 //! | 5 | [`transport`] | the equations: trajectories, direct light, connections | files, threads, shards, pictures |
 //! | 6 | [`farm`] | plan, worker processes, checkpoints, merge, engines for many machines | files of results |
 //! | 7 | [`report`] | EXR, CSV, PNG, JSON | how the numbers were made |

@@ -12,12 +12,12 @@ use lampyris::validate::scenes::run;
 
 /// `model` with a star-shaped object of `surface` at a node of its own.
 fn with_star(mut model: Model, series: Series, center: DVec3, to_world: DMat3, surface: Surface) -> Model {
-    let node = model.nodes.list.len() as u32;
+    let node = model.nodes.list.len();
     let name = Some("star".to_owned());
-    model.nodes.list.push(Node { index: node as usize, name, parent: None, world: DMat4::IDENTITY });
+    model.nodes.list.push(Node { index: node, name, parent: None, world: DMat4::IDENTITY });
     model.nodes.of_triangle.resize(model.triangles.len(), 0);
     let harmonic = Harmonic::new(Star::new(series).unwrap(), center, to_world).unwrap();
-    model.replacements.push(Replaced { harmonic, surface: model.surfaces.len() as u32, node });
+    model.replacements.push(Replaced { harmonic, surface: model.surfaces.len() as u32, node: Some(node as u32) });
     model.surfaces.push(surface);
     model
 }

@@ -108,7 +108,10 @@ fn source_vertex_scored_is_rejected() {
         };
         let Hit { position, normal, primitive, .. } = scene.geometry.closest_hit(&back).unwrap();
         let weight = first.weight / reflectance(scene, &first);
-        vertices.insert(0, Vertex { position, normal, primitive, weight, w_in: -normal, order: 0, after_delta: false });
+        vertices.insert(
+            0,
+            Vertex { position, normal, primitive, weight, w_in: -normal, order: 0, after_delta: false, emphasis: 1.0 },
+        );
     };
     assert!(!failures(&[furnace(scored)]).is_empty());
 }

@@ -77,6 +77,7 @@ fn connection_loop(which: segments::Scene, what: &str, reflectance: Reflectance)
         primitive: 0,
         order: 1,
         after_delta: false,
+        emphasis: 1.0,
     };
     let mut connectors = Connectors::default();
     for history in segments.vertices.chunks(6) {

@@ -94,7 +94,7 @@ fn bound_of_set(job: &Job, scene: &Scene, set: &ReceiverSet) -> f64 {
     // The median: a few receivers beside an edge must not raise the bound of all.
     let middle = found.len() / 2;
     let (_, illuminance, _) = found.select_nth_unstable_by(middle, f64::total_cmp);
-    let flux = scene.sources.flux();
+    let flux = scene.sources.started();
     SCORE_OF_A_HISTORY * PI * *illuminance / (flux * leaving / arriving)
 }
 

@@ -62,7 +62,7 @@ impl<'a> Thinning<'a> {
     /// Chooses from those that wait, with the weight of all for which each stands, over `thinning`.
     fn choose(&mut self) {
         let order = order(self.scene, &self.waiting);
-        let fluxes: Vec<f64> = order.par_iter().map(|&i| reflected(self.scene, &self.waiting[i])).collect();
+        let fluxes: Vec<f64> = order.par_iter().map(|&i| worth(self.scene, &self.waiting[i])).collect();
         let wanted = self.waiting.len().div_ceil(self.thinning);
         let step = fluxes.iter().sum::<f64>() / wanted as f64;
         // Nothing, or less light than a number can tell from nothing.
@@ -86,6 +86,13 @@ impl<'a> Thinning<'a> {
 fn reflected(scene: &Scene, vertex: &Vertex) -> f64 {
     let albedo = scene.surface(vertex.primitive).reflectance.albedo(-vertex.w_in.dot(vertex.normal));
     (vertex.weight * albedo).0.iter().sum()
+}
+
+/// What a vertex is chosen in proportion to \[lm\]: the flux that it reflects, but of light that comes beside the openings of daylight
+/// about the part that it sends there.
+fn worth(scene: &Scene, vertex: &Vertex) -> f64 {
+    let shares = scene.openings().iter().map(|opening| opening.share_of(vertex.position, vertex.normal));
+    reflected(scene, vertex) * (vertex.emphasis + shares.sum::<f64>()).min(1.0)
 }
 
 /// The numbers of the vertices, by the axis nearest to the normal and then along a curve through space (Morton's).

@@ -2,7 +2,7 @@
 
 use super::{
     Camera, Degree, DegreeWord, Estimator, Gonio, Grid, Job, Kept, Ratio, ReceiverKind, Region, Replacement, Roulette,
-    Sampling, Stop, lights,
+    Sampling, Stop, lights, sky,
 };
 use crate::error::{Error, Result};
 use std::collections::HashSet;
@@ -49,7 +49,8 @@ pub(super) fn check(job: &Job, file: &str) -> Result<()> {
     }
     check_estimator(&c, job)?;
     check_surfaces(&c, job)?;
-    lights::check(&c, job)
+    lights::check(&c, job)?;
+    sky::check(&c, job)
 }
 
 /// Counting on surface elements needs elements: only the cells of a grid are any.
@@ -344,10 +345,23 @@ impl<T: Debug> std::fmt::Display for Shown<T> {
     }
 }
 
-fn length(v: [f64; 3]) -> f64 {
+/// True for directions that are not parallel.
+pub(super) fn are_apart(a: [f64; 3], b: [f64; 3]) -> bool {
+    length(cross(a, b)) > 1e-6 * length(a) * length(b)
+}
+
+pub(super) fn length(v: [f64; 3]) -> f64 {
     (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt()
 }
 
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+pub(super) fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }

@@ -9,6 +9,9 @@ use serde::{Deserialize, Serialize};
 const MOST_LIGHT: f64 = 1e12;
 /// Largest factor on the intensities of a file.
 const MOST_FACTOR: f64 = 1e6;
+/// Least and greatest length of an area source \[m\].
+const SHORTEST: f64 = 1e-6;
+const LONGEST: f64 = 1e6;
 /// Largest exponent of a cosine: a beam of a fifth of a degree.
 const MOST_EXPONENT: f64 = 1e6;
 
@@ -46,6 +49,60 @@ pub enum Source {
         intensity: f64,
         /// The power: 1 for a small Lambert surface.
         exponent: f64,
+    },
+    /// A rectangle of even luminance.
+    Rectangle {
+        /// Its middle \[m\].
+        position: [f64; 3],
+        /// Normal of the side that shines; need not be a unit vector.
+        direction: [f64; 3],
+        /// Where its first edge points; what of it lies along `direction` does not count.
+        along: [f64; 3],
+        /// Lengths of the first edge and of the other \[m\].
+        size: [f64; 2],
+        /// Luminance \[cd/m2\]; either this or the next.
+        luminance: Option<f64>,
+        /// Flux of all that shines \[lm\].
+        flux: Option<f64>,
+        /// Whether the other side shines as well; else it absorbs.
+        #[serde(default)]
+        two_sided: bool,
+        /// Reflectance of what shines, 0 ..= 1.
+        #[serde(default)]
+        reflectance: f64,
+    },
+    /// A disc of even luminance.
+    Disc {
+        /// Its middle \[m\].
+        position: [f64; 3],
+        /// Normal of the side that shines; need not be a unit vector.
+        direction: [f64; 3],
+        /// Radius \[m\].
+        radius: f64,
+        /// Luminance \[cd/m2\]; either this or the next.
+        luminance: Option<f64>,
+        /// Flux of all that shines \[lm\].
+        flux: Option<f64>,
+        /// Whether the other side shines as well; else it absorbs.
+        #[serde(default)]
+        two_sided: bool,
+        /// Reflectance of what shines, 0 ..= 1.
+        #[serde(default)]
+        reflectance: f64,
+    },
+    /// A sphere of even luminance.
+    Sphere {
+        /// Its middle \[m\].
+        position: [f64; 3],
+        /// Radius \[m\].
+        radius: f64,
+        /// Luminance \[cd/m2\]; either this or the next.
+        luminance: Option<f64>,
+        /// Flux \[lm\].
+        flux: Option<f64>,
+        /// Reflectance, 0 ..= 1.
+        #[serde(default)]
+        reflectance: f64,
     },
 }
 
@@ -125,35 +182,69 @@ pub(super) fn check(c: &Checker, job: &Job) -> Result<()> {
     for (i, luminaire) in job.luminaires.iter().enumerate() {
         check_luminaire(c, &format!("luminaire[{i}]"), luminaire, job.scene.is_some())?;
     }
-    let lit = job.scene.is_some() || !job.sources.is_empty() || !job.luminaires.is_empty();
-    c.that("scene", "(missing)", lit, "a scene file, or at least one [[source]] or [[luminaire]]")
+    let lit = job.scene.is_some() || !job.sources.is_empty() || !job.luminaires.is_empty() || job.sky.is_some();
+    c.that("scene", "(missing)", lit, "a scene file, or at least one [[source]] or [[luminaire]], or a [sky]")
 }
 
 fn check_source(c: &Checker, at: &str, source: &Source) -> Result<()> {
-    let (position, direction, intensity) = match source {
-        Source::Omni { position, intensity } => (position, None, *intensity),
-        Source::Spot { position, direction, intensity, .. }
-        | Source::CosPower { position, direction, intensity, .. } => (position, Some(direction), *intensity),
-    };
-    c.position(&format!("{at}.position"), *position)?;
-    let fits = intensity > 0.0 && intensity <= MOST_LIGHT;
-    c.that(&format!("{at}.intensity"), intensity, fits, "above 0, at most 1e12 cd")?;
-    if let Some(direction) = direction {
-        c.direction(&format!("{at}.direction"), *direction)?;
-    }
-    match *source {
-        Source::Omni { .. } => Ok(()),
-        Source::Spot { inner_degrees: inner, outer_degrees: outer, .. } => {
-            let fits = outer > 0.0 && outer <= 90.0;
+    match source {
+        Source::Omni { position, intensity } => check_point(c, at, *position, None, *intensity),
+        Source::Spot { position, direction, intensity, inner_degrees: inner, outer_degrees: outer } => {
+            check_point(c, at, *position, Some(*direction), *intensity)?;
+            let fits = *outer > 0.0 && *outer <= 90.0;
             c.that(&format!("{at}.outer_degrees"), outer, fits, "above 0, at most 90")?;
-            let fits = inner >= 0.0 && inner < outer;
+            let fits = *inner >= 0.0 && inner < outer;
             c.that(&format!("{at}.inner_degrees"), inner, fits, "0 or more, below outer_degrees")
         }
-        Source::CosPower { exponent, .. } => {
-            let fits = (0.0..=MOST_EXPONENT).contains(&exponent);
+        Source::CosPower { position, direction, intensity, exponent } => {
+            check_point(c, at, *position, Some(*direction), *intensity)?;
+            let fits = (0.0..=MOST_EXPONENT).contains(exponent);
             c.that(&format!("{at}.exponent"), exponent, fits, "0 .. 1e6")
         }
+        Source::Rectangle { position, direction, along, size, luminance, flux, reflectance, .. } => {
+            c.direction(&format!("{at}.direction"), *direction)?;
+            c.direction(&format!("{at}.along"), *along)?;
+            let apart = super::check::are_apart(*direction, *along);
+            c.that(&format!("{at}.along"), format!("{along:?}"), apart, "not parallel to direction")?;
+            check_area(c, at, *position, ("size", size), (*luminance, *flux), *reflectance)
+        }
+        Source::Disc { position, direction, radius, luminance, flux, reflectance, .. } => {
+            c.direction(&format!("{at}.direction"), *direction)?;
+            check_area(c, at, *position, ("radius", &[*radius]), (*luminance, *flux), *reflectance)
+        }
+        Source::Sphere { position, radius, luminance, flux, reflectance } => {
+            check_area(c, at, *position, ("radius", &[*radius]), (*luminance, *flux), *reflectance)
+        }
     }
+}
+
+fn check_point(c: &Checker, at: &str, place: [f64; 3], direction: Option<[f64; 3]>, intensity: f64) -> Result<()> {
+    c.position(&format!("{at}.position"), place)?;
+    let fits = intensity > 0.0 && intensity <= MOST_LIGHT;
+    c.that(&format!("{at}.intensity"), intensity, fits, "above 0, at most 1e12 cd")?;
+    direction.map_or(Ok(()), |direction| c.direction(&format!("{at}.direction"), direction))
+}
+
+fn check_area(
+    c: &Checker,
+    at: &str,
+    place: [f64; 3],
+    (name, lengths): (&str, &[f64]),
+    (luminance, flux): (Option<f64>, Option<f64>),
+    reflectance: f64,
+) -> Result<()> {
+    c.position(&format!("{at}.position"), place)?;
+    for length in lengths {
+        let fits = (SHORTEST..=LONGEST).contains(length);
+        c.that(&format!("{at}.{name}"), length, fits, "1e-6 .. 1e6 m")?;
+    }
+    let given = usize::from(luminance.is_some()) + usize::from(flux.is_some());
+    c.that(at, format!("{given} of them"), given == 1, "either luminance or flux")?;
+    for (name, value) in [("luminance", luminance), ("flux", flux)] {
+        let fits = value.is_none_or(|x| x > 0.0 && x <= MOST_LIGHT);
+        c.that(&format!("{at}.{name}"), value.unwrap_or_default(), fits, "above 0, at most 1e12")?;
+    }
+    c.share(&format!("{at}.reflectance"), reflectance)
 }
 
 fn check_luminaire(c: &Checker, at: &str, luminaire: &Luminaire, has_scene: bool) -> Result<()> {

@@ -7,10 +7,12 @@ mod check;
 mod lights;
 mod receivers;
 mod replacement;
+mod sky;
 
 pub use lights::{Extent, Luminaire, Source};
 pub use receivers::{Camera, Gonio, Grid, Kept, Point, ReceiverKind, Region, SetShape, View};
 pub use replacement::{Degree, DegreeWord, Replacement};
+pub use sky::{NamedSky, Opening, Sky, SkyModel, Sun};
 
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -65,6 +67,12 @@ pub struct Job {
     /// Photometric webs at their places.
     #[serde(default, rename = "luminaire", skip_serializing_if = "Vec::is_empty")]
     pub luminaires: Vec<Luminaire>,
+    /// Daylight.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sky: Option<Sky>,
+    /// Where daylight enters: they guide the drawing of directions, and change no mean.
+    #[serde(default, rename = "opening", skip_serializing_if = "Vec::is_empty")]
+    pub openings: Vec<Opening>,
 }
 
 /// Default histories of a batch in a job with maps.

@@ -102,6 +102,7 @@ fn mix(mut z: u64) -> u64 {
 /// choice of the source    1    (none with a single source; every emissive triangle is one)
 /// omni, spot, parallel    2    direction, or place in the beam
 /// luminaire with extent   2+1+2  direction; face, point of it
+/// sky                     2+2  direction; place across it or in an opening
 /// emissive triangle       2+2  point, direction; 1 between them for the side, where both sides emit
 /// Lambert reflection      2    direction
 /// glossy reflection       1+2  part, direction; none for the direction of a mirror
@@ -173,6 +174,12 @@ pub fn sphere(u: DVec2) -> DVec3 {
 /// Direction of the hemisphere around +Z with density cosine/pi, from a point of the unit square.
 pub fn cosine_hemisphere(u: DVec2) -> DVec3 {
     around_z((1.0 - u.x).sqrt(), u.y)
+}
+
+/// Point number `k` of a sequence that fills the unit square evenly from the point `start` on: its steps are the inverse powers of
+/// the plastic number.
+pub fn evenly(start: DVec2, k: u64) -> DVec2 {
+    (start + k as f64 * DVec2::new(0.754_877_666_246_692_8, 0.569_840_290_998_053_2)).fract()
 }
 
 /// Point of the unit disc, uniform in area, from a point of the unit square.

@@ -2,6 +2,7 @@
 //! of regions, ratios. Here batch scores meet [`crate::tally::derived`], which knows how such intervals are made; here
 //! are the words for how that was, and for why there is none.
 
+use super::daylight::DaylightFactor;
 use super::values::{Bin, SetValues, Status};
 use crate::farm::merge::{Merged, SetResult};
 use crate::farm::plan::Plan;
@@ -46,6 +47,9 @@ pub(super) struct OfSet {
     /// Of a grid whose batches are kept.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub derived: Option<OfGrid>,
+    /// Of a grid whose batches are kept, or a point, where the job asks for it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub daylight_factor: Option<DaylightFactor>,
 }
 
 /// What is derived from a grid.
@@ -72,7 +76,8 @@ pub(super) struct OfRatio {
     pub quantity: Quantity,
 }
 
-/// What is derived from the set number `set` of the job, with `values` and `health` of its mean.
+/// What is derived from the set number `set` of the job, with `values` and `health` of its mean; `outdoor` is the illuminance over
+/// which daylight factors are asked for \[lx\].
 ///
 /// # Errors
 /// Those of reading the bins.
@@ -82,6 +87,7 @@ pub(super) fn of_set(
     set: usize,
     values: &SetValues,
     health: Health,
+    outdoor: Option<f64>,
 ) -> io::Result<OfSet> {
     let SetResult::Replicates { scores, fixed_direct } = &merged.sets[set] else { return Ok(OfSet::default()) };
     let confidence = plan.job.run.confidence;
@@ -89,13 +95,18 @@ pub(super) fn of_set(
     Ok(match values.shape.kind {
         ReceiverKind::Region => {
             let mean = Quantity::of_mean(&family.mean(), confidence, REGION).marked(health);
-            OfSet { interval: Some(mean), derived: None }
+            OfSet { interval: Some(mean), ..OfSet::default() }
         }
         ReceiverKind::Grid => {
-            let of_grid = OfGrid::new(&family, merged.batches, confidence);
-            OfSet { interval: None, derived: Some(of_grid.marked(health, health_of_least(values)?)) }
+            let of_grid = OfGrid::new(&family, merged.batches, confidence).marked(health, health_of_least(values)?);
+            let daylight_factor = outdoor.map(|e| DaylightFactor::new(e, &of_grid.mean, Some(&of_grid.min)));
+            OfSet { derived: Some(of_grid), daylight_factor, ..OfSet::default() }
         }
-        ReceiverKind::Camera | ReceiverKind::Gonio | ReceiverKind::Point => OfSet::default(),
+        ReceiverKind::Point => {
+            let value = Quantity::of_mean(&family.mean(), confidence, MEAN).marked(health);
+            OfSet { daylight_factor: outdoor.map(|e| DaylightFactor::new(e, &value, None)), ..OfSet::default() }
+        }
+        ReceiverKind::Camera | ReceiverKind::Gonio => OfSet::default(),
     })
 }
 

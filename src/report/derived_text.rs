@@ -1,5 +1,6 @@
 //! Derived quantities for a terminal: a line for each grid, region and ratio.
 
+use super::daylight::DaylightFactor;
 use super::derived::{OfGrid, OfRatio, Quantity};
 use super::number::{percent, short};
 use super::summary::{SetSummary, Summary};
@@ -13,7 +14,8 @@ pub(super) fn lines(summary: &Summary) -> Vec<String> {
     let grids = cut(of_sets(grid_line), "grids", "summary.json");
     let regions = cut(of_sets(region_line), "regions", "regions.csv");
     let ratios = cut(summary.ratios.iter().map(ratio_line).collect(), "ratios", "summary.json");
-    let lines: Vec<String> = [grids, regions, ratios].concat();
+    let factors = cut(of_sets(factor_line), "daylight factors", "summary.json");
+    let lines: Vec<String> = [grids, factors, regions, ratios].concat();
     if lines.is_empty() {
         return lines;
     }
@@ -35,6 +37,13 @@ fn grid_line(set: &SetSummary) -> Option<String> {
     let unit = format!(" {}", set.unit);
     let (mean, min, uo) = (about(mean, &unit), between(min, &unit), between(uniformity, ""));
     Some(format!("    {}: mean {mean}, min {min}, Uo {uo}", set.name))
+}
+
+fn factor_line(set: &SetSummary) -> Option<String> {
+    let DaylightFactor { outdoor_lx, mean, min } = set.of_set.daylight_factor.as_ref()?;
+    let least = min.as_ref().map(|min| format!(", min {}", between(min, " %"))).unwrap_or_default();
+    let (mean, outdoor) = (about(mean, " %"), short(*outdoor_lx, 5));
+    Some(format!("    {}: daylight factor {mean}{least} of {outdoor} lx outdoors", set.name))
 }
 
 fn region_line(set: &SetSummary) -> Option<String> {

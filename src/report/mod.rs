@@ -31,6 +31,7 @@
 
 mod canvas;
 mod csv;
+mod daylight;
 mod derived;
 mod derived_text;
 mod exr;

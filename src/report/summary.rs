@@ -1,6 +1,7 @@
 //! `summary.json`: what a whole receiver set says in a line, the flux balance, timings, and a digest by which two
 //! runs are compared. A number that is not finite is `null`.
 
+use super::daylight::outdoor;
 use super::derived::{OfRatio, OfSet, health_of_mean, of_set, ratios};
 use super::health::{Counts, Monitored, estimate_label, is_plain, lines};
 use super::stopping::StoppedBy;
@@ -120,6 +121,8 @@ pub(super) struct Collector<'a> {
     monitored: Vec<Monitored>,
     /// Of the means of the sets.
     healths: Vec<Health>,
+    /// Over which daylight factors are asked for \[lx\].
+    outdoor: Option<f64>,
     hasher: blake3::Hasher,
 }
 
@@ -127,7 +130,8 @@ impl<'a> Collector<'a> {
     /// Nothing gathered yet.
     pub fn new(plan: &'a Plan, merged: &'a Merged) -> Self {
         let (sets, monitored, healths) = (Vec::new(), Vec::new(), Vec::new());
-        Collector { plan, merged, sets, monitored, healths, hasher: blake3::Hasher::new() }
+        let (outdoor, hasher) = (outdoor(&plan.job), blake3::Hasher::new());
+        Collector { plan, merged, sets, monitored, healths, outdoor, hasher }
     }
 
     /// Takes in the next receiver set in job order.
@@ -137,7 +141,7 @@ impl<'a> Collector<'a> {
     pub fn add(&mut self, values: &SetValues) -> Result<()> {
         let place = self.sets.len();
         let health = health_of_mean(self.plan, self.merged, place, values)?;
-        let derived = of_set(self.plan, self.merged, place, values, health)?;
+        let derived = of_set(self.plan, self.merged, place, values, health, self.outdoor)?;
         self.healths.push(health);
         let shape = &values.shape;
         self.hasher.update(shape.name.as_bytes());

@@ -25,6 +25,11 @@ impl Choice {
         Choice::new(fluxes.map(Colour::luminance).collect())
     }
 
+    /// Number of things.
+    pub fn len(&self) -> usize {
+        self.weights.len()
+    }
+
     /// True where there is nothing to choose.
     pub fn is_empty(&self) -> bool {
         self.weights.is_empty()

@@ -11,10 +11,10 @@ use crate::photometry::Colour;
 const TOLERATED: f64 = 0.02;
 
 impl Light {
-    /// A source of a job.
-    pub(super) fn of_job(source: &job::Source) -> Light {
+    /// A source of a job; `None` for one that is a surface.
+    pub(super) fn of_job(source: &job::Source) -> Option<Light> {
         let radians = |degrees: f64| degrees * PI / 180.0;
-        match *source {
+        Some(match *source {
             job::Source::Omni { position, intensity } => {
                 Light::Omni { position: position.into(), intensity: Colour::grey(intensity) }
             }
@@ -31,7 +31,8 @@ impl Light {
                 intensity: Colour::grey(intensity),
                 exponent,
             },
-        }
+            job::Source::Rectangle { .. } | job::Source::Disc { .. } | job::Source::Sphere { .. } => return None,
+        })
     }
 }
 

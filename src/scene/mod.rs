@@ -4,29 +4,36 @@
 //! builds the acceleration structure, turns emissive triangles into area lights and prepares the choice of a
 //! source in proportion to flux. A scene does not know receivers, seeds or files.
 
+mod area;
 mod beam;
 mod body;
 mod choice;
+mod environment;
 pub mod gltf;
 mod groups;
 mod light;
 mod luminaires;
 mod luminous_mesh;
 mod nodes;
+mod opening;
 mod panel;
 pub mod photometric_web;
 mod reflectance;
 mod replace;
+mod sky;
 mod source;
 
 pub use beam::Beam;
 pub use body::{Body, BodyPoint, in_cone};
 pub use choice::Choice;
+pub use environment::Environment;
 pub use groups::Groups;
 pub use light::Light;
 pub use nodes::{Node, Nodes};
+pub use opening::{Aim, Opening};
 pub use panel::{Extended, Panel};
 pub use reflectance::{LawInLanes, Reflectance, Scattered, weight_over_tolerated, weights_over_tolerated};
+pub use sky::Sky;
 pub use source::{Emission, Emitter, Sources};
 
 use self::photometric_web::Luminaire;
@@ -84,7 +91,7 @@ pub struct Model {
     pub nodes: Nodes,
     /// Lights without extent.
     pub lights: Vec<Light>,
-    /// Luminaires with extent, whose faces are the last of the triangles, in this order.
+    /// Luminaires with extent, whose faces are the last of the triangles, in this order; those of area sources come after them.
     pub extended: Vec<Extended>,
     /// Cameras.
     pub cameras: Vec<CameraNode>,
@@ -94,15 +101,15 @@ pub struct Model {
     pub warnings: Vec<String>,
 }
 
-/// A star-shaped object in the place of the mesh of a node.
+/// A star-shaped object, mostly in the place of the mesh of a node.
 #[derive(Clone, Debug)]
 pub struct Replaced {
     /// The object, in world coordinates.
     pub harmonic: Harmonic,
     /// Its surface, an index into `surfaces`.
     pub surface: u32,
-    /// The node, a place in the list of nodes.
-    pub node: u32,
+    /// The node, a place in the list of nodes; those without one come last.
+    pub node: Option<u32>,
 }
 
 /// A model ready for transport, in re-centred coordinates.
@@ -139,7 +146,9 @@ impl Scene {
     ///
     /// # Errors
     /// As [`Scene::new`].
-    pub fn built(model: Model, job: &Job, build: Build) -> Result<Scene> {
+    pub fn built(mut model: Model, job: &Job, build: Build) -> Result<Scene> {
+        let of_panels = model.triangles.len();
+        job.sources.iter().try_for_each(|source| model.add_area_source(source))?;
         let offset = -middle(&model, &job.spheres);
         let paint = |c: Colour| match job.run.channels {
             Channels::Luminance => Colour::grey(c.luminance()),
@@ -157,21 +166,35 @@ impl Scene {
             surfaces.push(analytic_surface(share));
         }
         let mut nodes = model.nodes;
-        nodes.of_replacements = (surface_of.len() as u32, model.replacements.iter().map(|r| r.node).collect());
+        nodes.of_replacements = (surface_of.len() as u32, model.replacements.iter().filter_map(|r| r.node).collect());
         surface_of.extend(model.replacements.iter().map(|r| r.surface));
         let emitters = emitters(&geometry, &surfaces, &surface_of);
-        let lights = model.lights.into_iter().chain(job.sources.iter().map(Light::of_job));
+        let sky = job.sky.as_ref().map(Sky::of_job);
+        let sun = sky.iter().filter_map(|sky| sky.sun.clone());
+        let lights = model.lights.into_iter().chain(job.sources.iter().filter_map(Light::of_job)).chain(sun);
         let lights: Vec<Light> = lights.map(|l| l.moved(offset).recoloured(paint)).collect();
-        refuse_endless_flux(&geometry, &lights)?;
+        refuse_endless_flux(&geometry, &lights, sky.is_some())?;
+        let environment = Environment::new(sky, &lights, &job.openings, offset, &geometry);
         let given = lights.len();
-        let panels = panels(&geometry, model.triangles.len(), model.extended, |l| l.moved(offset).recoloured(paint));
+        let panels = panels(&geometry, of_panels, model.extended, |l| l.moved(offset).recoloured(paint));
         let bodies = bodies(&geometry, &surfaces, &surface_of);
-        let sources = Sources::new(lights, emitters, panels, bodies, geometry.bounding_sphere());
+        let mut sources = Sources::new(lights, emitters, panels, bodies, geometry.bounding_sphere());
+        if let Some(environment) = environment {
+            sources = sources.under(environment);
+        }
         let mut warnings = model.warnings;
+        if sources.environment.is_none() && !job.openings.is_empty() {
+            warnings.push("each [[opening]] ignored: there is neither a sky nor parallel light".to_owned());
+        }
         if sources.lights.len() < given {
             let dark = given - sources.lights.len();
             warnings
                 .push(format!("{dark} of {given} lights without flux ignored: dark, no cone, or nothing to shine on"));
+        }
+        if job.sky.as_ref().is_some_and(|sky| sky.daylight_factor) && sources.len() > 1 {
+            let others = sources.len() - 1;
+            warnings
+                .push(format!("daylight factors contain the light of {others} other sources, those of the scene file"));
         }
         if sources.is_empty() {
             return Err(Error::input("scene", "sources", "none", "at least one light or emissive surface"));
@@ -222,6 +245,16 @@ impl Scene {
             Some((panel, _)) => panel.luminance(w),
             None => self.surface(hit.primitive).emission,
         }
+    }
+
+    /// Where daylight enters; none without daylight.
+    pub fn openings(&self) -> &[Opening] {
+        self.sources.environment.as_ref().map_or(&[], |environment| &environment.openings)
+    }
+
+    /// Luminance of what lies beyond all surfaces in the direction of the unit vector `w` \[cd/m2\].
+    pub fn beyond(&self, w: DVec3) -> Colour {
+        self.sources.sky().map_or(Colour::BLACK, |sky| sky.luminance(w))
     }
 
     /// Number of primitives: triangles, spheres, planes.
@@ -332,7 +365,7 @@ fn bodies(geometry: &Geometry, surfaces: &[Surface], surface_of: &[u32]) -> Vec<
     surface_of[first..].iter().enumerate().filter_map(body).collect()
 }
 
-/// The luminaires with extent, whose faces are the last of the `triangles`, each `adapted` to the scene.
+/// The luminaires with extent, whose faces are the last of the first `triangles`, each `adapted` to the scene.
 fn panels(
     geometry: &Geometry,
     triangles: usize,
@@ -348,10 +381,17 @@ fn panels(
     all.into_iter().map(panel).collect()
 }
 
-fn refuse_endless_flux(geometry: &Geometry, lights: &[Light]) -> Result<()> {
+fn refuse_endless_flux(geometry: &Geometry, lights: &[Light], sky: bool) -> Result<()> {
+    let refused = |field: &str, value: &str, allowed: &str| Err(Error::input("scene", field, value, allowed));
+    if sky && geometry.is_unbounded() {
+        return refused("plane", "infinite", "no [[plane]] together with a [sky], whose light on it has no bound");
+    }
+    if sky && geometry.bounding_sphere().1 == 0.0 {
+        return refused("sky", "nothing below it", "a [sky] over a scene with at least one bounded surface");
+    }
     let parallel = lights.iter().any(|l| matches!(l, Light::Directional { .. }));
     if parallel && geometry.is_unbounded() {
-        return Err(Error::input("scene", "plane", "infinite", "no [[plane]] together with a directional light"));
+        return refused("plane", "infinite", "no [[plane]] together with a directional light");
     }
     Ok(())
 }

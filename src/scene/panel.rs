@@ -16,14 +16,14 @@ use crate::photometry::Colour;
 use crate::random::Generator;
 
 /// Corners of what stands for a circle, of the same area.
-const CORNERS: u32 = 64;
+pub(super) const CORNERS: u32 = 64;
 /// Times that the faces of an octahedron are divided in four to stand for a sphere, of the same surface.
 const DIVISIONS: u32 = 3;
 /// Share of its area below which a flat opening is seen edge-on, and dark.
 const EDGE_ON: f64 = 1e-9;
 
 /// A triangle, counter-clockwise seen from outside \[m\].
-type Triangle = [DVec3; 3];
+pub(super) type Triangle = [DVec3; 3];
 
 /// A luminaire with extent, as a job asks for it.
 #[derive(Clone, Debug)]
@@ -118,7 +118,7 @@ impl Panel {
 
 /// The corners of a polygon about the origin in the plane of `u` and `v`, half of its edges: four for the rectangle, more for an
 /// ellipse of the same area.
-fn around(u: DVec3, v: DVec3, corners: u32) -> Vec<DVec3> {
+pub(super) fn around(u: DVec3, v: DVec3, corners: u32) -> Vec<DVec3> {
     if corners == 4 {
         return vec![u + v, v - u, -u - v, u - v];
     }
@@ -132,7 +132,7 @@ fn around(u: DVec3, v: DVec3, corners: u32) -> Vec<DVec3> {
 }
 
 /// The triangles of a convex polygon.
-fn fan(corners: &[DVec3]) -> Vec<Triangle> {
+pub(super) fn fan(corners: &[DVec3]) -> Vec<Triangle> {
     (2..corners.len()).map(|i| [corners[0], corners[i - 1], corners[i]]).collect()
 }
 

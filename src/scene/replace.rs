@@ -33,7 +33,7 @@ impl Model {
         let harmonic =
             Harmonic::new(Star::new(file.series)?, world.transform_point3(file.center), DMat3::from_mat4(world))?;
         self.remove_triangles_of(place);
-        self.replacements.push(Replaced { harmonic, surface, node: place as u32 });
+        self.replacements.push(Replaced { harmonic, surface, node: Some(place as u32) });
         Ok(())
     }
 

@@ -6,9 +6,11 @@
 use super::beam::Beam;
 use super::body::Body;
 use super::choice::Choice;
+use super::environment::Environment;
 use super::groups::Groups;
 use super::light::Light;
 use super::panel::Panel;
+use super::sky::Sky;
 use crate::geometry::Geometry;
 use crate::math::{DVec3, PI, to_world};
 use crate::photometry::Colour;
@@ -70,6 +72,8 @@ pub struct Emission {
     pub direction: DVec3,
     /// W_1, the flux weight with which it arrives at the first vertex \[lm\].
     pub weight: Colour,
+    /// How much more often than in proportion to flux it is drawn, at most 1: small for what comes beside the openings of daylight.
+    pub emphasis: f64,
 }
 
 /// All sources, with the choice in proportion to flux.
@@ -97,6 +101,10 @@ pub struct Sources {
     beams: Vec<Option<Beam>>,
     /// Bounds of the panels.
     panel_beams: Vec<Beam>,
+    /// Light from outside, where there is a sky or an opening; parallel light then starts from there.
+    pub environment: Option<Environment>,
+    /// The choice among the ways of drawing light from outside \[lm\].
+    environment_flux: Choice,
     /// Centre and radius of the sphere that parallel light must cover \[m\].
     covered: (DVec3, f64),
 }
@@ -135,12 +143,32 @@ impl Sources {
             beams,
             panel_beams,
             covered,
+            environment: None,
+            environment_flux: Choice::default(),
         }
+    }
+
+    /// The same sources and the light from outside.
+    pub(super) fn under(mut self, environment: Environment) -> Self {
+        let own = |light: &Light| match light {
+            Light::Directional { .. } => Colour::BLACK,
+            _ => light.flux(self.covered.1),
+        };
+        self.light_flux = Choice::by_flux(self.lights.iter().map(own));
+        self.environment_flux = Choice::new(environment.fluxes().collect());
+        self.environment = Some(environment);
+        self
+    }
+
+    /// The sky, if there is one.
+    pub fn sky(&self) -> Option<&Sky> {
+        self.environment.as_ref()?.sky.as_ref()
     }
 
     /// Number of sources.
     pub fn len(&self) -> usize {
-        self.lights.len() + self.emitters.len() + self.panels.len() + self.bodies.len()
+        let sky = usize::from(self.sky().is_some());
+        self.lights.len() + self.emitters.len() + self.panels.len() + self.bodies.len() + sky
     }
 
     /// True in the dark.
@@ -148,9 +176,19 @@ impl Sources {
         self.len() == 0
     }
 
-    /// Luminous flux of all sources \[lm\].
+    /// Luminous flux of all sources \[lm\]; of those outside what falls on the scene and around it.
     pub fn flux(&self) -> f64 {
-        self.light_flux.all() + self.emitter_flux.all() + self.panel_flux.all() + self.body_flux.all()
+        let Some(environment) = &self.environment else { return self.started() };
+        let parallel = self.lights.iter().filter(|light| matches!(light, Light::Directional { .. }));
+        let outside: Colour = parallel.map(|light| light.flux(self.covered.1)).sum();
+        self.started() - self.environment_flux.all() + outside.luminance() + environment.sky_flux()
+    }
+
+    /// Luminous weight with which a history starts, its mean where light comes from outside \[lm\]: the flux of all sources, but
+    /// with openings only about what comes through them.
+    pub fn started(&self) -> f64 {
+        let inside = self.light_flux.all() + self.emitter_flux.all() + self.panel_flux.all() + self.body_flux.all();
+        inside + self.environment_flux.all()
     }
 
     /// Bounds of the lights, `None` of parallel light.
@@ -248,8 +286,10 @@ impl Sources {
 
     /// Starts a history. With a single source no number is drawn for the choice.
     pub fn emit(&self, geometry: &Geometry, rng: &mut Generator) -> Emission {
-        let mut target = if self.len() == 1 { 0.0 } else { rng.uniform() * self.flux() };
-        let kinds = [&self.light_flux, &self.emitter_flux, &self.panel_flux, &self.body_flux];
+        let kinds = [&self.light_flux, &self.emitter_flux, &self.panel_flux, &self.body_flux, &self.environment_flux];
+        let started = self.started();
+        let alone = kinds.iter().map(|choice| choice.len()).sum::<usize>() == 1;
+        let mut target = if alone { 0.0 } else { rng.uniform() * started };
         // Rounding may leave a rest behind the last source.
         let mut chosen = kinds.iter().rposition(|kind| !kind.is_empty()).expect("histories start where there is light");
         for (kind, fluxes) in kinds.iter().enumerate().take(chosen) {
@@ -267,10 +307,14 @@ impl Sources {
             }
             1 => (emit_triangle(&self.emitters[number], geometry, rng), self.emitters[number].flux()),
             2 => (self.panels[number].emit(geometry, rng), self.panels[number].luminaire.flux()),
+            4 => {
+                let outside = self.environment.as_ref().expect("ways to draw its light belong to an environment");
+                return outside.emit(number, started, rng);
+            }
             _ => (self.bodies[number].emit(geometry, rng), self.bodies[number].flux()),
         };
         // flux over the probability of the choice: the colour of the source, the luminous flux of all.
-        Emission { origin, direction, weight: flux * (self.flux() / flux.luminance()) }
+        Emission { origin, direction, weight: flux * (started / flux.luminance()), emphasis: 1.0 }
     }
 }
 

@@ -38,6 +38,7 @@
 //!
 //! Transport does not know files, threads, shards, how many histories run, nor the shape of a picture.
 
+mod aimed;
 mod bodies;
 pub mod connection;
 mod connectors;
@@ -50,6 +51,7 @@ pub mod neighbours;
 pub mod receiver;
 pub mod reverse;
 pub mod shared;
+pub mod sky;
 mod spherical_triangle;
 mod totals;
 pub mod trajectory;

@@ -149,7 +149,7 @@ pub struct Seen {
 pub fn look(scene: &Scene, ray: &Ray, rng: &mut Generator) -> Seen {
     match scene.geometry.closest_hit(ray) {
         Some(hit) => look_at(scene, hit, ray.direction, rng),
-        None => Seen { emitted: Colour::BLACK, receiver: None },
+        None => Seen { emitted: scene.beyond(ray.direction), receiver: None },
     }
 }
 
@@ -179,7 +179,10 @@ pub fn look_at(scene: &Scene, mut hit: Hit, mut direction: DVec3, rng: &mut Gene
         let origin = scene.geometry.lift(hit.position, hit.normal);
         match scene.geometry.closest_hit(&Ray { origin, direction }) {
             Some(next) => hit = next,
-            None => break,
+            None => {
+                seen.emitted += attenuation * scene.beyond(direction);
+                break;
+            }
         }
     }
     seen

@@ -10,7 +10,7 @@
 //! ```
 //!
 //! E_j is the illuminance from a light without extent, by a shadow ray of its own; area lights are found by hitting
-//! them. The laws of reflection are reciprocal, so `sample` with the path's own direction of travel draws v_k. What
+//! them, the sky by leaving the scene. The laws of reflection are reciprocal, so `sample` with the path's own direction of travel draws v_k. What
 //! lights without extent give r itself is [`lights_at`]; L0(r) belongs to the ray of the eye.
 //!
 //! The quantity is that of local estimation, which cannot carry light whose last surface before r is a delta surface:
@@ -49,11 +49,18 @@ pub fn path(scene: &Scene, transport: &Transport, receiver: &Receiver, rng: &mut
     let Some((mut ray, mut weight)) = leave(scene, receiver, rng) else { return found };
     let first = weight.luminance();
     for met in 1..=MAX_VERTICES {
-        let Some(hit) = scene.geometry.closest_hit(&ray).filter(|h| !scene.absorbs(h)) else { break };
+        let emitted = if met == 1 { &mut found.direct } else { &mut found.reflected };
+        let Some(hit) = scene.geometry.closest_hit(&ray) else {
+            *emitted += weight * scene.beyond(ray.direction);
+            break;
+        };
+        if scene.absorbs(&hit) {
+            break;
+        }
         let surface = scene.surface(hit.primitive);
         let back = -ray.direction;
         let response = |w_in| surface.reflectance.evaluate(hit.normal, w_in, back);
-        *(if met == 1 { &mut found.direct } else { &mut found.reflected }) += weight * scene.emitted(&hit, back);
+        *emitted += weight * scene.emitted(&hit, back);
         found.reflected += weight * from_lights(scene, hit.position, hit.normal, response);
         if surface.reflectance.is_peaked_at(back.dot(hit.normal)) {
             let matt = |w_in: DVec3| surface.reflectance.albedo(-w_in.dot(hit.normal)) / PI;

@@ -14,6 +14,7 @@ use super::connection::{Connected, Connectors, Link, LitPoint, Rule, Tile, conne
 use super::direct::{from_emitters, from_panels, from_some_emitters};
 use super::lamps::{Asked, ask, groups_of, panels_of};
 use super::receiver::Receiver;
+use super::sky::from_sky;
 use crate::geometry::Ray;
 use crate::geometry::visibility::{BUNDLE, BUNDLES, Lanes, Points, Scratch};
 use crate::math::{DVec2, DVec3, Vec3};
@@ -132,6 +133,7 @@ pub fn direct_light(
     for ((receiver, rng), light) in receivers.iter_mut().zip(&mut light) {
         *light += from_panels(scene, receiver, &panels, samples, rng);
         *light += from_bodies(scene, receiver, samples, rng);
+        *light += from_sky(scene, receiver, samples, rng);
     }
     if scene.sources.emitters.is_empty() {
         return light;

@@ -5,6 +5,7 @@
 //! what meets nothing has escaped, what a numerical guard stopped is lost. Russian roulette takes nothing on
 //! average, so emitted = absorbed + escaped + lost holds within the error of the roulette alone.
 
+use super::aimed::{is_aimed, scatter};
 use crate::geometry::Ray;
 use crate::job::{Roulette, Transport};
 use crate::math::DVec3;
@@ -32,6 +33,8 @@ pub struct Vertex {
     pub order: u32,
     /// True when the light came from a delta scatterer: no receiver-side path can find it.
     pub after_delta: bool,
+    /// How much more often than in proportion to flux its trajectory is drawn, at most 1.
+    pub emphasis: f64,
 }
 
 /// The straight way of light from one surface, or from its source, to the next.
@@ -106,7 +109,7 @@ impl FluxBalance {
 /// Traces one history; its vertices or its segments are appended to `record`.
 pub fn trace(scene: &Scene, transport: &Transport, rng: &mut Generator, record: &mut impl Record) -> FluxBalance {
     let start = scene.sources.emit(&scene.geometry, rng);
-    let first = start.weight.luminance();
+    let (mut first, mut emphasis) = (start.weight.luminance(), start.emphasis);
     let mut flux = FluxBalance { emitted: first, ..FluxBalance::default() };
     let mut ray = Ray { origin: start.origin, direction: start.direction };
     let mut weight = start.weight;
@@ -126,16 +129,34 @@ pub fn trace(scene: &Scene, transport: &Transport, rng: &mut Generator, record: 
         let reflectance = &scene.surface(hit.primitive).reflectance;
         if !reflectance.is_black() {
             let (position, normal, w_in) = (hit.position, hit.normal, ray.direction);
-            record.vertex(Vertex { position, normal, w_in, weight, primitive: hit.primitive, order, after_delta });
+            record.vertex(Vertex {
+                position,
+                normal,
+                w_in,
+                weight,
+                primitive: hit.primitive,
+                order,
+                after_delta,
+                emphasis,
+            });
         }
         if reflectance.has_delta() {
             flux.met_delta += weight.luminance();
         }
-        let Some(scattered) = reflectance.sample(hit.normal, ray.direction, rng) else {
+        let drawn = match is_aimed(scene, emphasis) {
+            true => scatter(scene, &hit, ray.direction, rng),
+            false => reflectance.sample(hit.normal, ray.direction, rng).map(|scattered| (scattered, false)),
+        };
+        let Some((scattered, enters)) = drawn else {
             flux.absorbed += weight.luminance();
             return flux;
         };
         let reflected = weight * scattered.factor;
+        if enters && !reflected.is_black() {
+            // Inside it counts like those that were drawn through the opening.
+            emphasis = (emphasis * first / reflected.luminance()).min(1.0);
+            first = reflected.luminance();
+        }
         flux.absorbed += weight.luminance() - reflected.luminance();
         let Some(survivor) = play(transport.roulette_below, first, weight, reflected, rng) else {
             return flux;

@@ -8,12 +8,14 @@ use crate::report::short;
 const DIGITS: usize = 6;
 
 /// What the cases of physics cannot be expressed in a scene of this program, and why.
-const NOT_EXPRESSIBLE: [(&str, &str); 9] = [
+const NOT_EXPRESSIBLE: [(&str, &str); 8] = [
     ("point source with I cos^m", "no source has this law; a glTF spot has its own falloff (`direct/spot`)"),
     ("spot of uniform intensity", "the falloff of a glTF spot has a ramp of at least 0.001 in the cosine"),
-    ("disc and sphere as luminaires, coaxial discs", "area lights are triangles (`direct/polygon` has 32 sides)"),
+    (
+        "coaxial discs",
+        "a disc is a polygon of 64 corners (`tests/daylight/sources.rs` has discs and spheres that shine)",
+    ),
     ("endless line of light", "no source is a line"),
-    ("overcast sky", "no sky, and surfaces emit the same in all directions; `direct/even-sky` is a box that emits"),
     ("sphere with zones", "a `[[sphere]]` has one reflectance"),
     ("receiver of any law in a furnace", "not a surface of the scene; `tests/glossy.rs` has it"),
     ("two infinite planes that emit", "a `[[plane]]` does not emit"),

@@ -13,6 +13,7 @@ pub mod clipping;
 pub mod closed_forms;
 mod comparison;
 mod cube;
+pub mod daylight;
 mod direct;
 mod document;
 pub mod experiment;
@@ -84,7 +85,7 @@ impl Case {
 pub fn cases() -> Vec<Case> {
     let themes = [direct::cases(), form_factors::cases(), cavities::cases(), bounces::cases()];
     let themes = themes.into_iter().flatten().chain(cube::cases()).chain(sobolev::cases());
-    themes.chain(luminaires::cases()).chain(openings::cases()).collect()
+    themes.chain(luminaires::cases()).chain(openings::cases()).chain(daylight::cases()).collect()
 }
 
 /// The cases whose names contain `part`; all without it.

@@ -58,6 +58,23 @@ pub fn box_walls(size: DVec3) -> [[DVec3; 3]; 6] {
     [[o, y, z], [x, z, y], [o, z, x], [y, x, z], [o, x, y], [z, y, x]]
 }
 
+/// Adds the parallelogram with a hole between the shares `across` of u and `along` of v, in eight quads.
+pub fn add_quad_with_hole(
+    model: &mut Model,
+    [origin, u, v]: [DVec3; 3],
+    across: [f64; 2],
+    along: [f64; 2],
+    surface: &Surface,
+) {
+    let ends = |[low, high]: [f64; 2]| [(0.0, low), (low, high - low), (high, 1.0 - high)];
+    for (i, (x, width)) in ends(across).into_iter().enumerate() {
+        for (j, (y, height)) in ends(along).into_iter().enumerate().filter(|(j, _)| (i, *j) != (1, 1)) {
+            assert!(width > 0.0 && height > 0.0, "a hole inside, {i} {j}");
+            add_quad(model, origin + x * u + y * v, width * u, height * v, surface.clone());
+        }
+    }
+}
+
 /// `model` in parallel light along `direction` of `illuminance` across it \[lx\].
 pub fn in_parallel_light(mut model: Model, direction: DVec3, illuminance: f64) -> Model {
     model.lights.push(Light::Directional { direction, illuminance: Colour::grey(illuminance) });

@@ -4,8 +4,18 @@ use lampyris::validate;
 use std::process::{Command, Output};
 
 /// Beginnings of the names of all cases; each is run by one test.
-pub const THEMES: [&str; 9] =
-    ["direct/", "form-factor/", "cavity/", "bounce/", "cube/", "sobolev/", "luminaire/", "opening/", "reflection/"];
+pub const THEMES: [&str; 10] = [
+    "direct/",
+    "form-factor/",
+    "cavity/",
+    "bounce/",
+    "cube/",
+    "sobolev/",
+    "luminaire/",
+    "opening/",
+    "reflection/",
+    "daylight/",
+];
 
 /// Runs `lampyris validate` with `args`.
 pub fn validate(args: &[&str]) -> Output {

@@ -16,6 +16,14 @@ const SHARDS: u64 = 4;
 
 /// An infinite plane below the room: it has nothing to do with the light in it, but makes the scene an open one.
 const OPEN: &str = "[[plane]]\npoint = [0.0, -3.0, 0.0]\nnormal = [0.0, 1.0, 0.0]\nreflectance = 0.3\n[[camera]]\n";
+/// Daylight, an opening to aim at, and area sources.
+const OF_SKY: (&str, &str) = (
+    "[[camera]]\n",
+    "[sky]\nmodel = 12\nhorizontal_illuminance = 10000\nground_reflectance = 0.2\n[sky.sun]\nazimuth_degrees = 20\n\
+     elevation_degrees = 40\nilluminance = 30000\n[[opening]]\ncorners = [[1, 1, -4], [3, 1, -4], [3, 2, -4]]\n\
+     [[source]]\nkind = \"sphere\"\nposition = [1, 2, -1]\nradius = 0.1\nflux = 100\n[[source]]\nkind = \"disc\"\n\
+     position = [2, 2, -1]\ndirection = [0, -1, 0]\nradius = 0.1\nluminance = 1000\n[[camera]]\n",
+);
 const RANDOM: (&str, &str) = ("seed = 23", "seed = 23\nsampling = \"random\"");
 const RGB: (&str, &str) = ("seed = 23", "seed = 23\nchannels = \"rgb\"");
 const OF_OPEN: (&str, &str) = ("[[camera]]\n", OPEN);
@@ -28,7 +36,7 @@ const DULL: (&str, &str) = ("room.glb", "dull.glb");
 /// Name and changes.
 type Variant = (&'static str, &'static [(&'static str, &'static str)]);
 
-const VARIANTS: [Variant; 7] = [
+const VARIANTS: [Variant; 8] = [
     ("closed", &[]),
     ("random-rgb", &[RANDOM, RGB]),
     ("open", &[OF_OPEN, DULL]),
@@ -36,6 +44,7 @@ const VARIANTS: [Variant; 7] = [
     ("plain", &[PLAIN]),
     ("reverse-rgb", &[REVERSE, RGB]),
     ("peaked", &[("room.glb", "peaked.glb")]),
+    ("sky", &[OF_SKY]),
 ];
 
 /// A place with the scenes of all variants.
@@ -148,7 +157,7 @@ fn direct_simulation_is_exact() {
 fn variants_are_what_they_are_called() {
     let place = place();
     let bounds = |(name, changes): &Variant| plan_in(&place.plan(&job_of(&place, name, changes), name)).bounds;
-    let [closed, _, open, _, plain, reverse, _] = VARIANTS.each_ref().map(bounds);
+    let [closed, _, open, _, plain, reverse, ..] = VARIANTS.each_ref().map(bounds);
     assert!(closed.len() == 5 && closed.iter().all(|b| *b == closed[0]), "{closed:?}");
     // Each set has a bound of its own; the region, the last of them, is made of pixels.
     assert!(open.len() == 5 && open[..4].iter().all(|b| b.is_finite()) && open[0] != open[2], "{open:?}");

@@ -175,6 +175,12 @@ impl Plan {
         if !self.job.luminaires.is_empty() {
             bytes.extend(serde_json::to_vec(&self.job.luminaires).expect("plain data always has a JSON form"));
         }
+        if let Some(sky) = &self.job.sky {
+            bytes.extend(serde_json::to_vec(sky).expect("plain data always has a JSON form"));
+        }
+        if !self.job.openings.is_empty() {
+            bytes.extend(serde_json::to_vec(&self.job.openings).expect("plain data always has a JSON form"));
+        }
         blake3::hash(&bytes)
     }
 

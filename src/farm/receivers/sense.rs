@@ -5,7 +5,6 @@
 
 use super::{Bins, ReceiverSet, gaze_ray};
 use crate::geometry::Ray;
-use crate::math::DVec3;
 use crate::photometry::Colour;
 use crate::random::Generator;
 use crate::random::sobol::PointSet;
@@ -136,11 +135,11 @@ impl ReceiverSet {
             let (hit, direction) = match gaze {
                 Gaze::Along(ray) => (hits.next().flatten(), ray.direction),
                 Gaze::At(hit, direction) => (Some(*hit), *direction),
-                Gaze::Nowhere => (None, DVec3::ZERO),
+                Gaze::Nowhere => return Seen { emitted: Colour::BLACK, receiver: None },
             };
             match hit {
                 Some(hit) => look_at(scene, hit, direction, rng),
-                None => Seen { emitted: Colour::BLACK, receiver: None },
+                None => Seen { emitted: scene.beyond(direction), receiver: None },
             }
         };
         gazes.iter().zip(rngs).map(&mut see).collect()

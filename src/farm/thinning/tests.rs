@@ -21,7 +21,7 @@ fn strewn(count: usize) -> Vec<Vertex> {
         let weight = Colour([rng.uniform(), rng.uniform(), 100.0 * rng.uniform()]);
         let towards = sphere(rng.uniform2());
         let w_in = if towards.dot(normal) < 0.0 { towards } else { -towards };
-        Vertex { position, normal, w_in, weight, primitive: rng.below(12), order: 1, after_delta: false }
+        Vertex { position, normal, w_in, weight, primitive: rng.below(12), order: 1, after_delta: false, emphasis: 1.0 }
     };
     (0..count).map(&mut vertex).collect()
 }
