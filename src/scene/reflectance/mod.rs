@@ -8,16 +8,20 @@
 //! `delta_reflectance` is its reflectance. Knows no geometry, no receivers and no wavelengths beyond three channels.
 
 mod albedo;
+mod delta;
 mod glossy;
 mod lanes;
 mod microfacet;
+mod pane;
 
 use crate::math::{DVec3, PI, to_world};
 use crate::photometry::Colour;
 use crate::random::{Generator, cosine_hemisphere};
 use glossy::Glossy;
 
+pub use delta::Delta;
 pub use lanes::{LawInLanes, weights_over_tolerated};
+pub use pane::Pane;
 
 /// pi f from which on a law counts as peaked: a connection may then weigh this many times one to a white matt surface.
 const PEAK: f64 = 4.0;
@@ -32,6 +36,8 @@ pub enum Reflectance {
     Lambert(Colour),
     /// A specular part, rough or a mirror, over a diffuse one; from [`Reflectance::metallic_roughness`].
     Glossy(Box<Glossy>),
+    /// Delta components alone: mirrors and glass.
+    Delta(Delta),
 }
 
 /// A sampled continuation of a trajectory.
@@ -72,6 +78,7 @@ impl Reflectance {
             Reflectance::Lambert(rho) if above(normal, w_in, w_out) => *rho / PI,
             Reflectance::Lambert(_) => Colour::BLACK,
             Reflectance::Glossy(law) => law.evaluate(normal, w_in, w_out),
+            Reflectance::Delta(_) => Colour::BLACK,
         }
     }
 
@@ -83,6 +90,7 @@ impl Reflectance {
                 Some(Scattered { direction, factor: *rho, delta: false })
             }
             Reflectance::Glossy(law) => law.sample(normal, w_in, rng),
+            Reflectance::Delta(law) => law.sample(normal, w_in),
         }
     }
 
@@ -93,6 +101,7 @@ impl Reflectance {
             Reflectance::Lambert(_) if above(normal, w_in, w_out) => w_out.dot(normal) / PI,
             Reflectance::Lambert(_) => 0.0,
             Reflectance::Glossy(law) => law.pdf(normal, w_in, w_out),
+            Reflectance::Delta(_) => 0.0,
         }
     }
 
@@ -102,6 +111,7 @@ impl Reflectance {
         match self {
             Reflectance::Lambert(rho) => *rho,
             Reflectance::Glossy(law) => law.albedo(cosine),
+            Reflectance::Delta(law) => law.reflectance(cosine),
         }
     }
 
@@ -110,6 +120,7 @@ impl Reflectance {
         match self {
             Reflectance::Lambert(_) => None,
             Reflectance::Glossy(law) => law.delta_reflectance(cosine),
+            Reflectance::Delta(law) => Some(law.reflectance(cosine)),
         }
     }
 
@@ -117,14 +128,14 @@ impl Reflectance {
     pub fn lambert(&self) -> Option<Colour> {
         match self {
             Reflectance::Lambert(rho) => Some(*rho),
-            Reflectance::Glossy(_) => None,
+            Reflectance::Glossy(_) | Reflectance::Delta(_) => None,
         }
     }
 
     /// The law where f depends on the directions, for many of them at once; `None` of Lambert surfaces.
     pub fn lanes(&self) -> Option<&LawInLanes> {
         match self {
-            Reflectance::Lambert(_) => None,
+            Reflectance::Lambert(_) | Reflectance::Delta(_) => None,
             Reflectance::Glossy(law) => Some(law.lanes()),
         }
     }
@@ -134,6 +145,7 @@ impl Reflectance {
         match self {
             Reflectance::Lambert(_) => Colour::WHITE,
             Reflectance::Glossy(law) => law.through(cosine),
+            Reflectance::Delta(_) => Colour::BLACK,
         }
     }
 
@@ -142,6 +154,7 @@ impl Reflectance {
         match self {
             Reflectance::Lambert(_) => false,
             Reflectance::Glossy(law) => law.has_delta(),
+            Reflectance::Delta(_) => true,
         }
     }
 
@@ -150,6 +163,7 @@ impl Reflectance {
         match self {
             Reflectance::Lambert(rho) => rho.is_black(),
             Reflectance::Glossy(law) => law.is_black(),
+            Reflectance::Delta(_) => true,
         }
     }
 
@@ -157,7 +171,7 @@ impl Reflectance {
     /// a direction 60 degrees from the normal is mirrored.
     pub fn is_peaked(&self) -> bool {
         match self {
-            Reflectance::Lambert(_) => false,
+            Reflectance::Lambert(_) | Reflectance::Delta(_) => false,
             Reflectance::Glossy(law) => law.is_peaked(),
         }
     }
@@ -166,7 +180,7 @@ impl Reflectance {
     /// peak.
     pub fn is_peaked_at(&self, cosine: f64) -> bool {
         match self {
-            Reflectance::Lambert(_) => false,
+            Reflectance::Lambert(_) | Reflectance::Delta(_) => false,
             Reflectance::Glossy(law) => law.is_peaked_at(cosine),
         }
     }
@@ -176,6 +190,7 @@ impl Reflectance {
         match self {
             Reflectance::Lambert(_) => 1.0,
             Reflectance::Glossy(law) => law.lobe_width(),
+            Reflectance::Delta(_) => 0.0,
         }
     }
 
@@ -191,6 +206,7 @@ impl Reflectance {
         match self {
             Reflectance::Lambert(rho) => Reflectance::Lambert(Colour::grey(rho.luminance())),
             Reflectance::Glossy(law) => Reflectance::Glossy(Box::new(law.grey())),
+            Reflectance::Delta(law) => Reflectance::Delta(law.grey()),
         }
     }
 }
