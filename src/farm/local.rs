@@ -96,7 +96,8 @@ impl Block<'_> {
     /// The receivers themselves.
     fn links(&self, sensed: &[Sensed]) -> Vec<Link> {
         let owners = (0..).zip(sensed);
-        owners.filter_map(|(owner, s)| Some(self.link(owner, s.receiver?, Colour::BLACK))).collect()
+        let both = owners.flat_map(|(owner, s)| [s.receiver, s.behind].map(|r| (owner, r)));
+        both.filter_map(|(owner, receiver)| Some(self.link(owner, receiver?, Colour::BLACK))).collect()
     }
 
     /// Connects `histories` to `links`, which lie `depth` reflections before their owners, and adds that to the owners' scores.
@@ -115,12 +116,15 @@ impl Block<'_> {
     fn connect_continuations(&self, sensed: &[Sensed], scores: &mut [BinScore]) {
         let all = self.histories.histories();
         let groups = (all / HISTORIES_OF_A_PATH).max(1);
-        let continued = |(owner, sensed): (usize, &Sensed)| {
-            let receiver = sensed.receiver.filter(|r| is_due(self.scene, r, self.rule.bound))?;
+        let of_one = |owner: usize, receiver: Option<Receiver>| {
+            let receiver = receiver.filter(|r| is_due(self.scene, r, self.rule.bound))?;
             let paths = self.set.continuations(self.bins[owner], self.batch, groups);
             Some(Continued { owner: owner as u32, receiver, paths })
         };
-        let mut continued: Vec<Continued> = sensed.par_iter().enumerate().filter_map(continued).collect();
+        let continued = |(owner, sensed): (usize, &Sensed)| {
+            [sensed.receiver, sensed.behind].into_iter().filter_map(move |receiver| of_one(owner, receiver))
+        };
+        let mut continued: Vec<Continued> = sensed.par_iter().enumerate().flat_map_iter(continued).collect();
         if continued.is_empty() {
             return;
         }

@@ -5,10 +5,12 @@
 
 mod check;
 mod lights;
+mod material;
 mod receivers;
 mod replacement;
 
 pub use lights::{Extent, Luminaire, Source};
+pub use material::{Material, Share};
 pub use receivers::{Camera, Gonio, Grid, Kept, Point, ReceiverKind, Region, SetShape, View};
 pub use replacement::{Degree, DegreeWord, Replacement};
 
@@ -59,6 +61,9 @@ pub struct Job {
     /// Series of spherical harmonics in the place of meshes.
     #[serde(default, rename = "replace", skip_serializing_if = "Vec::is_empty")]
     pub replacements: Vec<Replacement>,
+    /// Laws of reflection in the place of those of the scene file.
+    #[serde(default, rename = "material", skip_serializing_if = "Vec::is_empty")]
+    pub materials: Vec<Material>,
     /// Light sources beside those of the scene file.
     #[serde(default, rename = "source", skip_serializing_if = "Vec::is_empty")]
     pub sources: Vec<Source>,

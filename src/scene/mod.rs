@@ -8,11 +8,13 @@ mod body;
 pub mod gltf;
 mod light;
 mod luminaires;
+mod materials;
 mod nodes;
 mod panel;
 pub mod photometric_web;
 mod reflectance;
 mod replace;
+mod road_table;
 mod source;
 mod veils;
 
@@ -20,7 +22,10 @@ pub use body::{Body, BodyPoint, in_cone};
 pub use light::Light;
 pub use nodes::{Node, Nodes};
 pub use panel::{Extended, Panel};
-pub use reflectance::{Delta, LawInLanes, Pane, Reflectance, Scattered, weight_over_tolerated, weights_over_tolerated};
+pub use reflectance::{
+    Delta, Glass, LawInLanes, Pane, Reflectance, Scattered, Tabulated, weight_over_tolerated, weights_over_tolerated,
+};
+pub use road_table::law_of_road;
 pub use source::{Emission, Emitter, Sources};
 pub use veils::Meeting;
 

@@ -4,7 +4,7 @@
 //! reflection and no delta scatterer is counted. What is not let through is *met*: the surface's law of reflection has it, and
 //! its albedo is a share of what is met.
 
-use super::{Delta, Reflectance, Scene, Surface};
+use super::{Delta, Reflectance, Scattered, Scene, Surface};
 use crate::geometry::{Hit, Ray};
 use crate::math::{DVec3, Vec3};
 use crate::photometry::Colour;
@@ -80,6 +80,35 @@ impl Scene {
     /// The ray that goes on along `direction` behind the surface that it met at `hit`.
     pub fn beyond(&self, hit: &Hit, direction: DVec3) -> Ray {
         Ray { origin: self.geometry.lift(hit.position, -hit.normal), direction }
+    }
+
+    /// Draws how light along `direction` goes on at `hit`, where it is met; inside glass it has become less on its way there.
+    pub fn scatter(&self, hit: &Hit, direction: DVec3, rng: &mut Generator) -> Option<Scattered> {
+        let reflectance = &self.surface(hit.primitive).reflectance;
+        let scattered = reflectance.sample_from(hit.front, hit.normal, direction, rng)?;
+        match reflectance {
+            Reflectance::Delta(Delta::Glass(glass)) if !hit.front => {
+                Some(Scattered { factor: scattered.factor * glass.left(hit.distance), ..scattered })
+            }
+            _ => Some(scattered),
+        }
+    }
+
+    /// The same for an eye ray: what luminance is found beyond counts with the square of the index less or more.
+    pub fn scatter_eye_ray(&self, hit: &Hit, direction: DVec3, rng: &mut Generator) -> Option<Scattered> {
+        let scattered = self.scatter(hit, direction, rng)?;
+        match &self.surface(hit.primitive).reflectance {
+            Reflectance::Delta(Delta::Glass(glass)) if scattered.transmitted => {
+                Some(Scattered { factor: scattered.factor * glass.luminance_factor(hit.front), ..scattered })
+            }
+            _ => Some(scattered),
+        }
+    }
+
+    /// The ray of light that was scattered at `hit`.
+    pub fn leaving(&self, hit: &Hit, scattered: &Scattered) -> Ray {
+        let side = if scattered.transmitted { -hit.normal } else { hit.normal };
+        Ray { origin: self.geometry.lift(hit.position, side), direction: scattered.direction }
     }
 
     /// Chooses whether light along `direction` goes on behind `hit` or is met there; without a choice no number is drawn. With `mirrors`

@@ -146,7 +146,7 @@ impl Tile {
     /// The tile of `links`, at most [`TILE`], which lie `depth` reflections before their owners.
     pub fn new(scene: &Scene, links: Vec<Link>, depth: u32) -> Self {
         assert!(links.len() <= TILE, "a tile holds {TILE} receivers");
-        let constant: Vec<_> = links.iter().map(|l| l.receiver.response.constant(scene)).collect();
+        let constant: Vec<_> = links.iter().map(|l| l.receiver.response.constant(scene, l.receiver.normal)).collect();
         let column = |f: &dyn Fn(&Receiver) -> f64| {
             let mut column: Column = [[0.0; BUNDLE]; BUNDLES];
             column.as_flattened_mut().iter_mut().zip(&links).for_each(|(c, l)| *c = f(&l.receiver) as f32);

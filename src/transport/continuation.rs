@@ -73,7 +73,7 @@ pub fn continue_from(scene: &Scene, receiver: &Receiver, bound: f64, rng: &mut G
             }
             weight = weight / survival;
         }
-        let next = found.receiver(scene, weight);
+        let next = found.receiver(scene, weight).on_one_side(scene, rng);
         if next.response.is_peaked() {
             path.caustic += from_lights_as_if_matt(scene, &next).luminance();
         }

@@ -27,7 +27,7 @@ use crate::job::{Roulette, Transport};
 use crate::math::{DVec3, PI, to_world};
 use crate::photometry::Colour;
 use crate::random::{Generator, cosine_hemisphere};
-use crate::scene::{Light, Scene};
+use crate::scene::{Light, Scattered, Scene};
 
 /// Guard against paths that never end.
 const MAX_VERTICES: u32 = 1 << 16;
@@ -58,18 +58,22 @@ pub fn path(scene: &Scene, transport: &Transport, receiver: &Receiver, rng: &mut
         let response = |w_in| surface.reflectance.evaluate(hit.normal, w_in, back);
         *(if met == 1 { &mut found.direct } else { &mut found.reflected }) += weight * scene.emitted(&hit, back);
         found.reflected += weight * from_lights(scene, hit.position, hit.normal, response);
+        if surface.reflectance.sides().is_some() {
+            let transmitted = |w_in| surface.reflectance.evaluate(-hit.normal, w_in, back);
+            found.reflected += weight * from_lights(scene, hit.position, -hit.normal, transmitted);
+        }
         if surface.reflectance.is_peaked_at(back.dot(hit.normal)) {
             let matt = |w_in: DVec3| surface.reflectance.albedo(-w_in.dot(hit.normal)) / PI;
             found.caustic += weight * from_lights(scene, hit.position, hit.normal, matt);
         }
-        let Some(next) = surface.reflectance.sample(hit.normal, ray.direction, rng) else { break };
+        let Some(next) = scene.scatter_eye_ray(&hit, ray.direction, rng) else { break };
         // No connection carries what a mirror sends straight to the receiver.
         if met == 1 && next.delta {
             break;
         }
         let Some(survivor) = play(transport.roulette_below, first, weight, weight * next.factor, rng) else { break };
         weight = survivor;
-        ray = Ray { origin: scene.geometry.lift(hit.position, hit.normal), direction: next.direction };
+        ray = scene.leaving(&hit, &next);
     }
     found
 }
@@ -90,7 +94,13 @@ fn leave(scene: &Scene, receiver: &Receiver, rng: &mut Generator) -> Option<(Ray
     let (direction, weight) = match receiver.response {
         Response::Cosine => (to_world(normal, cosine_hemisphere(rng.uniform2())), Colour::grey(PI)),
         Response::Reflectance { primitive, to_eye, attenuation, .. } => {
-            let drawn = scene.surface(primitive).reflectance.sample(normal, -to_eye, rng)?;
+            let drawn = match receiver.response.side(scene, normal) {
+                Some(colour) => {
+                    let direction = to_world(normal, cosine_hemisphere(rng.uniform2()));
+                    Scattered { direction, factor: colour, delta: false, transmitted: false }
+                }
+                None => scene.surface(primitive).reflectance.sample(normal, -to_eye, rng)?,
+            };
             (!drawn.delta).then_some((drawn.direction, attenuation * drawn.factor))?
         }
     };

@@ -127,7 +127,7 @@ pub fn trace(scene: &Scene, transport: &Transport, rng: &mut Generator, record: 
         if reflectance.has_delta() {
             flux.met_delta += weight.luminance();
         }
-        let Some(scattered) = reflectance.sample(hit.normal, ray.direction, rng) else {
+        let Some(scattered) = scene.scatter(&hit, ray.direction, rng) else {
             flux.absorbed += weight.luminance();
             return flux;
         };
@@ -138,7 +138,7 @@ pub fn trace(scene: &Scene, transport: &Transport, rng: &mut Generator, record: 
         };
         weight = survivor;
         after_delta = scattered.delta;
-        ray = Ray { origin: scene.geometry.lift(hit.position, hit.normal), direction: scattered.direction };
+        ray = scene.leaving(&hit, &scattered);
     }
     flux.lost += weight.luminance();
     flux

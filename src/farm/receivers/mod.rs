@@ -18,7 +18,6 @@ use crate::error::{Error, Result};
 use crate::geometry::Ray;
 use crate::job::{Camera, Grid, Job, Point, Sampling, SetShape};
 use crate::math::{DVec2, DVec3};
-use crate::photometry::Colour;
 use crate::random::sobol::PointSet;
 use crate::random::{Domain, Generator, Stream};
 use crate::scene::Scene;
@@ -270,7 +269,7 @@ fn gaze(scene: &Scene, eye: &Eye, film: DVec2, rng: &mut Generator) -> Seen {
     match eye.gaze(film) {
         Gaze::Along(ray) => look(scene, &ray, rng),
         Gaze::At(hit, direction) => look_at(scene, hit, direction, rng),
-        Gaze::Nowhere => Seen { emitted: Colour::BLACK, receiver: None },
+        Gaze::Nowhere => Seen::NOTHING,
     }
 }
 

@@ -1,13 +1,15 @@
 //! Clear glass: KHR_materials_transmission, with KHR_materials_ior and KHR_materials_volume.
 //!
-//! A material that transmits is a thin pane. The base colour is what is left of light that crosses the glass once along the
-//! normal; roughness, texture and volume have no effect, and that is said. What transmits in part, or is a metal, stays opaque.
+//! A material that transmits is a thin pane, whose base colour is what is left of light that crosses the glass once along the
+//! normal; with a volume of some thickness it is the surface of a body, tinted by its attenuation. Roughness has no effect, and that
+//! is said. What transmits in part, or is a metal, stays opaque.
 
 use super::document::Material;
 use super::problem::{File, Warnings};
 use crate::error::Result;
+use crate::math::log;
 use crate::photometry::Colour;
-use crate::scene::{Delta, Pane, Reflectance};
+use crate::scene::{Delta, Glass, Pane, Reflectance};
 
 /// Greatest refractive index.
 const MAX_INDEX: f64 = 10.0;
@@ -38,8 +40,18 @@ pub(super) fn glass(
     if material.pbr_metallic_roughness.roughness_factor > 0.0 {
         warnings.add(format!("material `{name}`: roughnessFactor is ignored: glass is polished"));
     }
-    if extensions.volume.as_ref().is_some_and(|volume| volume.thickness_factor > 0.0) {
-        warnings.add(format!("material `{name}`: KHR_materials_volume is ignored: each surface is a thin pane"));
+    let Some(volume) = extensions.volume.as_ref().filter(|volume| volume.thickness_factor > 0.0) else {
+        return Ok(Some(Reflectance::Delta(Delta::Pane(Pane::new(index, base)))));
+    };
+    if base != Colour::WHITE {
+        warnings.add(format!(
+            "material `{name}`: the base colour of a body of glass is ignored: attenuationColor tints it"
+        ));
     }
-    Ok(Some(Reflectance::Delta(Delta::Pane(Pane::new(index, base)))))
+    let field = format!("{path}.extensions.KHR_materials_volume.attenuationColor");
+    let colour = Colour(file.all_between(field, volume.attenuation_color, f64::MIN_POSITIVE, 1.0)?);
+    let field = format!("{path}.extensions.KHR_materials_volume.attenuationDistance");
+    let distance = file.between(field, volume.attenuation_distance.unwrap_or(f64::MAX), f64::MIN_POSITIVE, f64::MAX)?;
+    let absorption = colour.map(|c| if c == 1.0 { 0.0 } else { -log(c) / distance });
+    Ok(Some(Reflectance::Delta(Delta::Glass(Glass::new(index, absorption)))))
 }
