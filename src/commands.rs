@@ -1,5 +1,6 @@
 //! One function for each subcommand: what it computes, what it prints, how it exits. Farm and report meet here.
 
+mod laws;
 mod submit;
 mod watch;
 
@@ -79,6 +80,8 @@ pub fn execute(command: Command) -> Result<Outcome> {
             Ok(Outcome { text, exit: Exit::Done })
         }
         Command::Luminaire { file, output } => luminaire(&file, output),
+        Command::Reflectance { job } => laws::reflectance(&job),
+        Command::Brdf { table, output } => laws::brdf(&table, &output),
         Command::Validate { case, markdown, note } => validate(case.as_deref(), markdown.as_deref(), note.as_deref()),
     }
 }

@@ -32,6 +32,41 @@ pub struct Prepared {
 /// # Errors
 /// [`Error::Input`] for whatever the job or the scene gets wrong.
 pub fn prepare(path: &Path) -> Result<Prepared> {
+    let Read { job, scene, file, text, mut files } = read(path)?;
+    let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let job_file = Input::of(&file_name(path), text.as_bytes());
+    let inputs = files.iter().map(|(input, _): &(Input, Vec<u8>)| input.clone()).collect();
+    let mut summary = summary(&scene);
+    summary.warnings.extend(lift_warning(&scene));
+    summary.warnings.extend(ReceiverSet::check(&job, &scene, &file)?);
+    Regions::check(&job, &scene, &file)?;
+    let plan = Plan::new(&name, job, job_file.clone(), inputs, summary)?;
+    let bounds = bounds(&plan.job, &scene);
+    let plan = plan.bounded(bounds);
+    files.push((job_file, text.into_bytes()));
+    Ok(Prepared { plan, files })
+}
+
+/// A job with its scene, and the files both were read from.
+struct Read {
+    job: Job,
+    scene: Scene,
+    /// Name of the job file in errors, and its text.
+    file: String,
+    text: String,
+    /// Every input with its bytes, those of the scene first.
+    files: Vec<(Input, Vec<u8>)>,
+}
+
+/// The scene of the job file at `path`, nothing planned.
+///
+/// # Errors
+/// [`Error::Input`] for whatever the job or the scene gets wrong.
+pub fn read_scene(path: &Path) -> Result<Scene> {
+    Ok(read(path)?.scene)
+}
+
+fn read(path: &Path) -> Result<Read> {
     let file = path.display().to_string();
     let bytes = fs::read(path).map_err(|e| Error::input("command line", "JOB", &file, format!("a job file ({e})")))?;
     let text = String::from_utf8(bytes).map_err(|_| Error::input(&file, "(encoding)", "not UTF-8", "UTF-8 text"))?;
@@ -54,18 +89,7 @@ pub fn prepare(path: &Path) -> Result<Prepared> {
         degree::fix(&mut job, &scene);
         scene = Scene::built(furnished(model, &job, &file, (&series, &webs, &tables))?, &job, Build::Quick)?;
     }
-    let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let job_file = Input::of(&file_name(path), text.as_bytes());
-    let inputs = files.iter().map(|(input, _): &(Input, Vec<u8>)| input.clone()).collect();
-    let mut summary = summary(&scene);
-    summary.warnings.extend(lift_warning(&scene));
-    summary.warnings.extend(ReceiverSet::check(&job, &scene, &file)?);
-    Regions::check(&job, &scene, &file)?;
-    let plan = Plan::new(&name, job, job_file.clone(), inputs, summary)?;
-    let bounds = bounds(&plan.job, &scene);
-    let plan = plan.bounded(bounds);
-    files.push((job_file, text.into_bytes()));
-    Ok(Prepared { plan, files })
+    Ok(Read { job, scene, file, text, files })
 }
 
 /// The scene of `plan` from the copies in `folder`.

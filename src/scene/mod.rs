@@ -219,6 +219,13 @@ impl Scene {
         &self.surfaces[self.surface_of[primitive as usize] as usize]
     }
 
+    /// The surfaces that something in the scene has.
+    pub fn used_surfaces(&self) -> impl Iterator<Item = &Surface> {
+        let mut used = vec![false; self.surfaces.len()];
+        self.surface_of.iter().for_each(|&s| used[s as usize] = true);
+        self.surfaces.iter().zip(used).filter(|(_, used)| *used).map(|(surface, _)| surface)
+    }
+
     /// Luminance that a surface emits where `hit`, towards the unit vector `w` \[cd/m2\]; of its lit side.
     pub fn emitted(&self, hit: &Hit, w: DVec3) -> Colour {
         match self.sources.panel_face(hit.primitive) {

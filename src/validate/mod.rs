@@ -16,6 +16,7 @@ mod direct;
 mod document;
 pub mod experiment;
 mod form_factors;
+mod glass;
 pub mod reference;
 pub mod scenes;
 pub mod sobolev;
@@ -80,7 +81,7 @@ impl Case {
 /// All cases, in order.
 pub fn cases() -> Vec<Case> {
     let themes = [direct::cases(), form_factors::cases(), cavities::cases(), bounces::cases()];
-    themes.into_iter().flatten().chain(cube::cases()).chain(sobolev::cases()).collect()
+    themes.into_iter().flatten().chain(cube::cases()).chain(glass::cases()).chain(sobolev::cases()).collect()
 }
 
 /// The cases whose names contain `part`; all without it.

@@ -4,7 +4,7 @@ use lampyris::validate;
 use std::process::{Command, Output};
 
 /// Beginnings of the names of all cases; each is run by one test.
-pub const THEMES: [&str; 6] = ["direct/", "form-factor/", "cavity/", "bounce/", "cube/", "sobolev/"];
+pub const THEMES: [&str; 7] = ["direct/", "form-factor/", "cavity/", "bounce/", "cube/", "glass/", "sobolev/"];
 
 /// Runs `lampyris validate` with `args`.
 pub fn validate(args: &[&str]) -> Output {

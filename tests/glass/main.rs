@@ -6,3 +6,8 @@ mod common;
 mod opal;
 mod panes;
 mod solid;
+
+#[test]
+fn the_battery_holds() {
+    common::battery::assert_theme("glass/");
+}

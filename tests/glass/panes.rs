@@ -123,7 +123,7 @@ fn estimators_agree_in_a_room_parted_by_a_pane() {
         estimates.into_iter().map(|set| set[0]).collect()
     };
     // What the pane mirrors is light whose last surface may be a mirror: missing in both, and found by both beyond.
-    let (local, reverse) = (means("local", 1024), means("reverse", 8192));
+    let (local, reverse) = (means("local", 2048), means("reverse", 8192));
     let names = ["wall", "lit", "behind", "corner"];
     let comparisons = names.iter().zip(local).zip(reverse).map(|((name, a), b)| difference(name, a, b));
     assert_all(&comparisons.collect::<Vec<_>>());

@@ -120,5 +120,7 @@ fn share(exponent: f64, mu: f64) -> f64 {
         let end = acos(-a / b);
         (a * end + (b * b - a * a).sqrt()) / PI
     };
-    (exponent + 2.0) / (exponent + 1.0) * (0..POINTS).map(mean).sum::<f64>() / POINTS as f64
+    let share = (exponent + 2.0) / (exponent + 1.0) * (0..POINTS).map(mean).sum::<f64>() / POINTS as f64;
+    // 1 at normal incidence, but for what the rule makes of it.
+    share.min(1.0)
 }

@@ -20,10 +20,15 @@ const CELLS: usize = 48;
 const BY_COSINE: f64 = 0.1;
 
 /// A tabulated law.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Tabulated(Arc<Table>);
 
-#[derive(Debug)]
+impl std::fmt::Debug for Tabulated {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        write!(f, "Tabulated({} polar angles, {} azimuths)", self.0.polar.len(), self.0.azimuths.len())
+    }
+}
+
 struct Table {
     /// Polar angles of both directions \[rad\], ascending from 0.
     polar: Vec<f64>,
