@@ -3,6 +3,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod materials;
 mod opal;
 mod panes;
 mod solid;

@@ -77,7 +77,7 @@ fn estimators_agree_under_an_opal_luminaire() {
     let means = |estimator: &str, histories: u32| -> Vec<Estimate> {
         Case::new(&job(estimator, histories), luminaire()).values()
     };
-    let (local, reverse) = (means("local", 512), means("reverse", 8192));
+    let (local, reverse) = (means("local", 1024), means("reverse", 12288));
     let names = ["cover", "floor", "below"];
     let all = names.iter().zip(local).zip(reverse).map(|((name, a), b)| difference(name, a, b));
     assert_all(&all.collect::<Vec<_>>());

