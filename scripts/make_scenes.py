@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Writes the scenes that ship, scenes/{room,cornell,furnace,figure2,office}.glb, bit for bit the same on every machine.
+"""Writes the scenes that ship, scenes/{room,cornell,furnace,figure2,office,glass}.glb, bit for bit the same on every machine.
 
     scripts/make_scenes.py            write them
     scripts/make_scenes.py --check    compare them with the files that are there; exit 1 where one differs
 
 Units are those of glTF: metres, +Y up, candela for point lights, cd/m2 for emissive surfaces. Every surface is
-Lambert (metallic 0, roughness 1) and one-sided; its front is the side on which light travels. Faces that meet
+Lambert (metallic 0, roughness 1) and one-sided, but for a screen of glass; its front is the side on which light travels. Faces that meet
 share their corners to the last bit, floors and ceilings have holes where something stands on them, so no two
 surfaces lie in one place; `check_closed` proves it each time. Only + - * / and sqrt are used on numbers: these
 are exactly rounded everywhere.
@@ -26,7 +26,8 @@ SCENES = Path(__file__).resolve().parent.parent / "scenes"
 def main():
     check = parse_arguments(sys.argv[1:])
     wrong = 0
-    for name, build in [("room", room), ("cornell", cornell), ("furnace", furnace), ("figure2", figure2), ("office", office)]:
+    scenes = [("room", room), ("cornell", cornell), ("furnace", furnace), ("figure2", figure2), ("office", office), ("glass", glass)]
+    for name, build in scenes:
         path, content = SCENES / f"{name}.glb", build()
         if not check:
             path.write_bytes(content)
@@ -165,6 +166,42 @@ def office():
     return gltf.bytes()
 
 
+def glass():
+    """A room of 4 x 2.6 x 3 m with a lamp in a globe, a screen of glass and a ball; the job says of what they are."""
+    hall = box((0.0, 0.0, -3.0), (4.0, 2.6, 0.0))
+    gltf = Gltf("Glass")
+    gltf.surface("floor", [reverse(hall["-y"])], grey("floor", 0.3))
+    gltf.surface("walls", [reverse(hall[side]) for side in (*SIDES, "+y")], grey("wall", 0.6))
+    globe, ball = (1.2, 1.7, -1.6), (2.9, 0.35, -1.3)
+    gltf.surface("globe", sphere(globe, 0.25, 4), grey("globe", 0.8))
+    gltf.surface("ball", sphere(ball, 0.35, 4), grey("ball", 0.8))
+    pane = [(2.1, 0.0, -0.4), (2.1, 0.0, -2.6), (2.1, 1.9, -2.6), (2.1, 1.9, -0.4)]
+    gltf.surface("screen", [pane], transmitting(grey("screen", 0.97)))
+    gltf.lamp("lamp", globe, 100.0)
+    gltf.camera("camera", (0.3, 1.5, -0.3), (2.6, 0.8, -1.7), 1.0)
+    return gltf.bytes()
+
+
+def sphere(centre, radius, depth):
+    """The faces of an octahedron, halved along each edge `depth` times and pushed out to a sphere; fronts outward."""
+    x, y, z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+    u, v, w = (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0)
+    faces = [(x, y, z), (y, u, z), (u, v, z), (v, x, z), (y, x, w), (u, y, w), (v, u, w), (x, v, w)]
+
+    def between(a, b):
+        middle = [p + q for p, q in zip(a, b, strict=True)]
+        length = math.sqrt(sum(p * p for p in middle))
+        return tuple(p / length for p in middle)
+
+    for _ in range(depth):
+        halves = []
+        for a, b, c in faces:
+            d, e, f = between(a, b), between(b, c), between(c, a)
+            halves += [(a, d, f), (d, b, e), (f, e, c), (d, e, f)]
+        faces = halves
+    return [tuple(tuple(m + radius * p for m, p in zip(centre, corner, strict=True)) for corner in f) for f in faces]
+
+
 # Corners of the floor of the Cornell box and of the blocks that stand on it: x, z in the millimetres and axes of the
 # original (x to the left, z away from the camera).
 CORNELL_FLOOR = [
@@ -273,6 +310,13 @@ def emitting(material, colour, luminance):
     return {**material, "emissiveFactor": list(colour), "extensions": strength}
 
 
+def transmitting(material):
+    """`material` as a pane of polished glass."""
+    factors = {**material["pbrMetallicRoughness"], "roughnessFactor": 0.0}
+    extensions = {"KHR_materials_transmission": {"transmissionFactor": 1.0}}
+    return {**material, "pbrMetallicRoughness": factors, "extensions": extensions}
+
+
 # --- the file format --------------------------------------------------------------------------------------------
 
 
@@ -315,7 +359,8 @@ class Gltf:
 
     def bytes(self):
         """The finished .glb."""
-        used = [e for e in ("KHR_lights_punctual", "KHR_materials_emissive_strength") if e in json.dumps(self.json)]
+        known = ("KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_materials_transmission")
+        used = [e for e in known if e in json.dumps(self.json)]
         if used:
             self.json["extensionsUsed"] = used
         self.json["buffers"] = [{"byteLength": len(self.binary)}]

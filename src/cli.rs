@@ -156,6 +156,21 @@ pub enum Command {
         #[arg(short, long, value_name = "OUT.png")]
         output: Option<PathBuf>,
     },
+    /// Say of each material of a job how much light it reflects and transmits, by the angle of incidence.
+    #[command(after_help = "Example:\n  lampyris reflectance jobs/glass.toml")]
+    Reflectance {
+        /// A job file.
+        job: PathBuf,
+    },
+    /// Turn a road-surface r-table (CIE 144) into a tabulated law for [[material]].
+    #[command(after_help = "Example:\n  lampyris brdf r3.txt -o r3.brdf")]
+    Brdf {
+        /// A line `beta` with angles, then lines of tan(gamma) and 10^4 r; docs/brdf-format.md.
+        table: PathBuf,
+        /// The file to write.
+        #[arg(short, long, value_name = "OUT.brdf")]
+        output: PathBuf,
+    },
     /// Run cases with an exact answer and print reference, estimate, interval and z; exit code 1 if any fails.
     #[command(after_help = "Examples:\n  lampyris validate\n  lampyris validate --case sobolev/\n  \
                       lampyris validate --markdown --note 'Commit abc, two cores.'")]

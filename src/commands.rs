@@ -10,7 +10,7 @@ use lampyris::farm::coordinator::{self, Options};
 use lampyris::farm::engines::missing::Missing;
 use lampyris::farm::engines::slurm;
 use lampyris::farm::folder::{Folder, plan_text};
-use lampyris::farm::inputs::{Prepared, prepare};
+use lampyris::farm::inputs::{Prepared, prepare, read_scene};
 use lampyris::farm::merge::compact::Compacted;
 use lampyris::farm::merge::goal::Look;
 use lampyris::farm::merge::settle::wait_until_whole;
@@ -22,6 +22,7 @@ use lampyris::fit;
 use lampyris::geometry::simd;
 use lampyris::report;
 use lampyris::scene::photometric_web::Photometry;
+use lampyris::scene::{Tabulated, law_of_road};
 use lampyris::validate::{self, Found};
 use std::fs::OpenOptions;
 use std::path::{Path, PathBuf};
@@ -83,6 +84,8 @@ pub fn execute(command: Command) -> Result<Outcome> {
             Ok(Outcome { text, exit: Exit::Done })
         }
         Command::Luminaire { file, output } => luminaire(&file, output),
+        Command::Reflectance { job } => reflectance(&job),
+        Command::Brdf { table, output } => brdf(&table, &output),
         Command::Validate { case, markdown, note } => validate(case.as_deref(), markdown.as_deref(), note.as_deref()),
     }
 }
@@ -271,6 +274,22 @@ fn luminaire(file: &Path, output: Option<PathBuf>) -> Result<Outcome> {
     report::write_polar(&picture, &title, &photometry)?;
     let text = format!("{}curves in {}\n", report::luminaire_text(&photometry), picture.display());
     Ok(Outcome { text, exit: Exit::Done })
+}
+
+/// What each material of the job reflects and transmits.
+fn reflectance(job: &Path) -> Result<Outcome> {
+    Ok(Outcome { text: report::reflectance_text(&read_scene(job)?), exit: Exit::Done })
+}
+
+/// Writes the tabulated law of an r-table.
+fn brdf(table: &Path, output: &Path) -> Result<Outcome> {
+    let name = table.display().to_string();
+    let text = std::fs::read_to_string(table)
+        .map_err(|e| Error::input("command line", "TABLE", &name, format!("a text with an r-table ({e})")))?;
+    let law = law_of_road(&name, &text)?;
+    Tabulated::parse(&name, law.as_bytes())?;
+    std::fs::write(output, &law).map_err(Error::io(output))?;
+    Ok(Outcome { text: format!("tabulated law in {}\n", output.display()), exit: Exit::Done })
 }
 
 /// Runs the cases, shows each as soon as it is done, and writes the document `markdown` if one is wanted.

@@ -13,7 +13,7 @@ use crate::geometry::harmonic::MAX_DEGREE;
 use crate::geometry::harmonic::file::File;
 use crate::job::{Degree, Job};
 use crate::scene::photometric_web::Photometry;
-use crate::scene::{Model, Scene, gltf};
+use crate::scene::{Model, Scene, Tabulated, gltf};
 use std::collections::HashMap;
 use std::fs;
 use std::path::{Component, Path};
@@ -32,26 +32,7 @@ pub struct Prepared {
 /// # Errors
 /// [`Error::Input`] for whatever the job or the scene gets wrong.
 pub fn prepare(path: &Path) -> Result<Prepared> {
-    let file = path.display().to_string();
-    let bytes = fs::read(path).map_err(|e| Error::input("command line", "JOB", &file, format!("a job file ({e})")))?;
-    let text = String::from_utf8(bytes).map_err(|_| Error::input(&file, "(encoding)", "not UTF-8", "UTF-8 text"))?;
-    let mut job = Job::parse(&text, &file)?;
-    let mut files = Vec::new();
-    let model = match &job.scene {
-        Some(name) => read_model(path, name, &mut files)?,
-        None => Model::default(),
-    };
-    let series = job.replacements.iter().enumerate().map(|(i, r)| read_series(path, i, &r.harmonic, &mut files));
-    let series: Vec<File> = series.collect::<Result<_>>()?;
-    let webs: Vec<Photometry> =
-        job.luminaire_files().into_iter().map(|name| read_web(path, &job, name, &mut files)).collect::<Result<_>>()?;
-    let kept = degree::is_open(&job).then(|| model.clone());
-    // Planning asks few rays (one a pixel where a region names a node), and each worker builds the scene again.
-    let mut scene = Scene::built(furnished(model, &job, &file, &series, &webs)?, &job, Build::Quick)?;
-    if let Some(model) = kept {
-        degree::fix(&mut job, &scene);
-        scene = Scene::built(furnished(model, &job, &file, &series, &webs)?, &job, Build::Quick)?;
-    }
+    let Read { job, scene, file, text, mut files } = read(path)?;
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let job_file = Input::of(&file_name(path), text.as_bytes());
     let inputs = files.iter().map(|(input, _): &(Input, Vec<u8>)| input.clone()).collect();
@@ -66,12 +47,57 @@ pub fn prepare(path: &Path) -> Result<Prepared> {
     Ok(Prepared { plan, files })
 }
 
+/// A job with its scene, and the files both were read from.
+struct Read {
+    job: Job,
+    scene: Scene,
+    /// Name of the job file in errors, and its text.
+    file: String,
+    text: String,
+    /// Every input with its bytes, those of the scene first.
+    files: Vec<(Input, Vec<u8>)>,
+}
+
+/// The scene of the job file at `path`, nothing planned.
+///
+/// # Errors
+/// [`Error::Input`] for whatever the job or the scene gets wrong.
+pub fn read_scene(path: &Path) -> Result<Scene> {
+    Ok(read(path)?.scene)
+}
+
+fn read(path: &Path) -> Result<Read> {
+    let file = path.display().to_string();
+    let bytes = fs::read(path).map_err(|e| Error::input("command line", "JOB", &file, format!("a job file ({e})")))?;
+    let text = String::from_utf8(bytes).map_err(|_| Error::input(&file, "(encoding)", "not UTF-8", "UTF-8 text"))?;
+    let mut job = Job::parse(&text, &file)?;
+    let mut files = Vec::new();
+    let model = match &job.scene {
+        Some(name) => read_model(path, name, &mut files)?,
+        None => Model::default(),
+    };
+    let series = job.replacements.iter().enumerate().map(|(i, r)| read_series(path, i, &r.harmonic, &mut files));
+    let series: Vec<File> = series.collect::<Result<_>>()?;
+    let webs: Vec<Photometry> =
+        job.luminaire_files().into_iter().map(|name| read_web(path, &job, name, &mut files)).collect::<Result<_>>()?;
+    let tables: Vec<Tabulated> =
+        job.tables().map(|(i, name)| read_table(path, i, name, &mut files)).collect::<Result<_>>()?;
+    let kept = degree::is_open(&job).then(|| model.clone());
+    // Planning asks few rays (one a pixel where a region names a node), and each worker builds the scene again.
+    let mut scene = Scene::built(furnished(model, &job, &file, (&series, &webs, &tables))?, &job, Build::Quick)?;
+    if let Some(model) = kept {
+        degree::fix(&mut job, &scene);
+        scene = Scene::built(furnished(model, &job, &file, (&series, &webs, &tables))?, &job, Build::Quick)?;
+    }
+    Ok(Read { job, scene, file, text, files })
+}
+
 /// The scene of `plan` from the copies in `folder`.
 ///
 /// # Errors
 /// [`Error::Refused`] for a copy that is damaged; [`Error::Input`] for a scene that asks for a file not planned.
 pub fn load_scene(folder: &Folder, plan: &Plan) -> Result<Scene> {
-    let (of_scene, of_series, of_webs) = parts(plan)?;
+    let Parts { of_scene, of_series, of_webs, of_tables } = parts(plan)?;
     let model = match of_scene.split_first() {
         Some((first, others)) => {
             let mut fetch = |uri: &str| match others.iter().find(|i| i.name == uri) {
@@ -86,23 +112,42 @@ pub fn load_scene(folder: &Folder, plan: &Plan) -> Result<Scene> {
     let series: Vec<File> = series.collect::<Result<_>>()?;
     let webs = of_webs.iter().map(|input| Photometry::parse(&input.name, &folder.read_input(input)?));
     let webs: Vec<Photometry> = webs.collect::<Result<_>>()?;
-    Scene::new(furnished(model, &plan.job, "plan", &series, &webs)?, &plan.job)
+    let tables = of_tables.iter().map(|input| Tabulated::parse(&input.name, &folder.read_input(input)?));
+    let tables: Vec<Tabulated> = tables.collect::<Result<_>>()?;
+    Scene::new(furnished(model, &plan.job, "plan", (&series, &webs, &tables))?, &plan.job)
 }
 
-/// The inputs of the scene itself, a series for each `[[replace]]`, and each file of a `[[luminaire]]` once.
-fn parts(plan: &Plan) -> Result<(&[Input], &[Input], &[Input])> {
+/// The inputs of a plan by what they are for.
+struct Parts<'a> {
+    of_scene: &'a [Input],
+    /// One for each `[[replace]]`.
+    of_series: &'a [Input],
+    /// Each file of a `[[luminaire]]` once.
+    of_webs: &'a [Input],
+    /// One for each tabulated `[[material]]`.
+    of_tables: &'a [Input],
+}
+
+fn parts(plan: &Plan) -> Result<Parts<'_>> {
     let (series, webs) = (plan.job.replacements.len(), plan.job.luminaire_files().len());
-    let Some(of_scene) = plan.inputs.len().checked_sub(series + webs) else {
-        let allowed = "a file for each [[replace]], and those of each [[luminaire]]";
+    let tables = plan.job.tables().count();
+    let Some(of_scene) = plan.inputs.len().checked_sub(series + webs + tables) else {
+        let allowed = "a file for each [[replace]] and tabulated [[material]], and those of each [[luminaire]]";
         return Err(Error::input("plan", "inputs", plan.inputs.len(), allowed));
     };
     let (of_scene, others) = plan.inputs.split_at(of_scene);
-    let (of_series, of_webs) = others.split_at(series);
-    Ok((of_scene, of_series, of_webs))
+    let (of_series, others) = others.split_at(series);
+    let (of_webs, of_tables) = others.split_at(webs);
+    Ok(Parts { of_scene, of_series, of_webs, of_tables })
 }
 
-/// `model` with the `series` of `job` in the place of the meshes that it names, and its luminaires with their `webs`.
-fn furnished(mut model: Model, job: &Job, file: &str, series: &[File], webs: &[Photometry]) -> Result<Model> {
+/// `model` with the series of `job` in the place of the meshes that it names, its luminaires with their webs, and its materials.
+fn furnished(
+    mut model: Model,
+    job: &Job,
+    file: &str,
+    (series, webs, tables): (&[File], &[Photometry], &[Tabulated]),
+) -> Result<Model> {
     for (i, (replacement, whole)) in job.replacements.iter().zip(series).enumerate() {
         let degree = match replacement.degree {
             Some(Degree::Number(degree)) => degree as usize,
@@ -110,6 +155,10 @@ fn furnished(mut model: Model, job: &Job, file: &str, series: &[File], webs: &[P
         };
         let truncated = File { series: whole.series.truncated(degree), ..whole.clone() };
         model.replace((file, &format!("replace[{i}]")), &replacement.node, truncated)?;
+    }
+    let table_of: HashMap<usize, &Tabulated> = job.tables().map(|(i, _)| i).zip(tables).collect();
+    for (i, material) in job.materials.iter().enumerate() {
+        model.paint((file, &format!("material[{i}]")), material, table_of.get(&i).copied())?;
     }
     let web_of: HashMap<&str, &Photometry> = job.luminaire_files().into_iter().zip(webs).collect();
     for (i, luminaire) in job.luminaires.iter().enumerate() {
@@ -128,6 +177,18 @@ fn read_series(job_path: &Path, i: usize, name: &str, files: &mut Vec<(Input, Ve
     let file = File::parse(name, &bytes)?;
     files.push((Input::of(name, &bytes), bytes));
     Ok(file)
+}
+
+/// Reads the table `name` of `[[material]]` number `i` of the job at `job_path`, and adds it to `files`.
+fn read_table(job_path: &Path, i: usize, name: &str, files: &mut Vec<(Input, Vec<u8>)>) -> Result<Tabulated> {
+    let path = job_path.parent().unwrap_or(Path::new("")).join(name);
+    let bytes = fs::read(&path).map_err(|e| {
+        let allowed = format!("a table of docs/brdf-format.md, relative to the job file ({e})");
+        Error::input(job_path.display(), format!("material[{i}].file"), name, allowed)
+    })?;
+    let table = Tabulated::parse(name, &bytes)?;
+    files.push((Input::of(name, &bytes), bytes));
+    Ok(table)
 }
 
 /// Reads the photometric file `name` of `job` at `job_path`, and adds it to `files`.

@@ -84,8 +84,8 @@ impl Block<'_> {
             start: Colour::BLACK,
             watched: self.is_watched(self.bins[owner as usize]),
         };
-        let owners = (0..).zip(sensed);
-        owners.filter_map(|(owner, s)| Some(link((owner, s.receiver?)))).collect()
+        let both = (0..).zip(sensed).flat_map(|(owner, s)| [s.receiver, s.behind].map(|receiver| (owner, receiver)));
+        both.filter_map(|(owner, receiver)| Some(link((owner, receiver?)))).collect()
     }
 
     /// Connects `histories` to `links`, which lie `depth` reflections before the receivers, and adds that to the scores of the

@@ -2,7 +2,7 @@
 
 use super::{
     Camera, Degree, DegreeWord, Estimator, Gonio, Grid, Job, Kept, Ratio, ReceiverKind, Region, Replacement, Roulette,
-    Sampling, Stop, lights, sky,
+    Sampling, Stop, lights, material, sky,
 };
 use crate::error::{Error, Result};
 use std::collections::HashSet;
@@ -49,6 +49,7 @@ pub(super) fn check(job: &Job, file: &str) -> Result<()> {
     }
     check_estimator(&c, job)?;
     check_surfaces(&c, job)?;
+    material::check(&c, job)?;
     lights::check(&c, job)?;
     sky::check(&c, job)
 }

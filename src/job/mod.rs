@@ -5,11 +5,13 @@
 
 mod check;
 mod lights;
+mod material;
 mod receivers;
 mod replacement;
 mod sky;
 
 pub use lights::{Extent, Luminaire, Source};
+pub use material::{Material, Share};
 pub use receivers::{Camera, Gonio, Grid, Kept, Point, ReceiverKind, Region, SetShape, View};
 pub use replacement::{Degree, DegreeWord, Replacement};
 pub use sky::{NamedSky, Opening, Sky, SkyModel, Sun};
@@ -61,6 +63,9 @@ pub struct Job {
     /// Series of spherical harmonics in the place of meshes.
     #[serde(default, rename = "replace", skip_serializing_if = "Vec::is_empty")]
     pub replacements: Vec<Replacement>,
+    /// Laws of reflection in the place of those of the scene file.
+    #[serde(default, rename = "material", skip_serializing_if = "Vec::is_empty")]
+    pub materials: Vec<Material>,
     /// Light sources beside those of the scene file.
     #[serde(default, rename = "source", skip_serializing_if = "Vec::is_empty")]
     pub sources: Vec<Source>,

@@ -40,6 +40,7 @@ mod luminaire;
 mod number;
 mod png;
 mod polar;
+mod reflectance;
 mod regions;
 mod scale;
 mod stopping;
@@ -52,6 +53,7 @@ pub use luminaire::luminaire_text;
 pub use number::short;
 pub use png::MAP_ORIGIN;
 pub use polar::write_polar;
+pub use reflectance::reflectance_text;
 pub use views::{View, write_views};
 
 use crate::error::{Error, Result};

@@ -13,7 +13,7 @@
 
 use super::opening::Opening;
 use super::{Emission, Light, Sky};
-use crate::geometry::{Geometry, Ray};
+use crate::geometry::Geometry;
 use crate::job;
 use crate::math::{DVec2, DVec3, PI, to_world};
 use crate::photometry::Colour;
@@ -132,7 +132,8 @@ impl Environment {
             let flux = weight * opening.area * towards.dot(side).max(0.0) / f64::from(PROBES);
             let origin = geometry.lift(opening.point(u(0.25)), side);
             all += flux;
-            if geometry.closest_hit(&Ray { origin, direction: towards }).is_none() {
+            // A pane in the opening does not close it.
+            if geometry.visible(origin.as_vec3(), (origin + towards * (4.0 * self.covered.1)).as_vec3()) {
                 open += flux;
             }
         }

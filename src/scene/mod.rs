@@ -14,14 +14,17 @@ mod groups;
 mod light;
 mod luminaires;
 mod luminous_mesh;
+mod materials;
 mod nodes;
 mod opening;
 mod panel;
 pub mod photometric_web;
 mod reflectance;
 mod replace;
+mod road_table;
 mod sky;
 mod source;
+mod veils;
 
 pub use beam::Beam;
 pub use body::{Body, BodyPoint, in_cone};
@@ -32,13 +35,17 @@ pub use light::Light;
 pub use nodes::{Node, Nodes};
 pub use opening::{Aim, Opening};
 pub use panel::{Extended, Panel};
-pub use reflectance::{LawInLanes, Reflectance, Scattered, weight_over_tolerated, weights_over_tolerated};
+pub use reflectance::{
+    Delta, Glass, LawInLanes, Pane, Reflectance, Scattered, Tabulated, weight_over_tolerated, weights_over_tolerated,
+};
+pub use road_table::law_of_road;
 pub use sky::Sky;
 pub use source::{Emission, Emitter, Sources};
+pub use veils::Meeting;
 
 use self::photometric_web::Luminaire;
 use crate::error::{Error, Result};
-use crate::geometry::{Build, Geometry, Harmonic, Hit, Mesh, Plane, Sphere};
+use crate::geometry::{Build, Geometry, Harmonic, Hit, Plane, Sphere};
 use crate::job::{self, Channels, Job};
 use crate::math::DVec3;
 use crate::photometry::Colour;
@@ -155,11 +162,14 @@ impl Scene {
             Channels::Rgb => c,
         };
         let corners = model.triangles.iter().map(|t| t.map(|v| (model.positions[v as usize] + offset).as_vec3()));
-        let mesh = Mesh::built(&corners.collect::<Vec<_>>(), build);
+        let corners: Vec<_> = corners.collect();
         let mut surfaces: Vec<Surface> = model.surfaces.into_iter().map(|s| painted(s, job.run.channels)).collect();
         let mut surface_of = model.surface_of;
+        let veils: Vec<bool> = surface_of.iter().map(|&s| surfaces[s as usize].is_veil()).collect();
         let harmonics = model.replacements.iter().map(|r| r.harmonic.clone().moved(offset)).collect();
-        let geometry = Geometry::new(mesh, spheres(job, offset), planes(job, offset)).with_harmonics(harmonics);
+        let geometry = Geometry::veiled(&corners, &veils, build)
+            .with_quadrics(spheres(job, offset), planes(job, offset))
+            .with_harmonics(harmonics);
         let shares = job.spheres.iter().map(|s| s.reflectance).chain(job.planes.iter().map(|p| p.reflectance));
         for share in shares {
             surface_of.push(surfaces.len() as u32);
@@ -237,6 +247,13 @@ impl Scene {
     /// The surface of a primitive.
     pub fn surface(&self, primitive: u32) -> &Surface {
         &self.surfaces[self.surface_of[primitive as usize] as usize]
+    }
+
+    /// The surfaces that something in the scene has.
+    pub fn used_surfaces(&self) -> impl Iterator<Item = &Surface> {
+        let mut used = vec![false; self.surfaces.len()];
+        self.surface_of.iter().for_each(|&s| used[s as usize] = true);
+        self.surfaces.iter().zip(used).filter(|(_, used)| *used).map(|(surface, _)| surface)
     }
 
     /// Luminance that a surface emits where `hit`, towards the unit vector `w` \[cd/m2\]; of its lit side.

@@ -25,8 +25,8 @@ pub fn is_aimed(scene: &Scene, emphasis: f64) -> bool {
 /// Draws the direction after a reflection at `hit`, and says whether an opening lies there; `None` where nothing was reflected.
 pub fn scatter(scene: &Scene, hit: &Hit, w_in: DVec3, rng: &mut Generator) -> Option<(Scattered, bool)> {
     let reflectance = &scene.surface(hit.primitive).reflectance;
-    if reflectance.has_delta() {
-        return reflectance.sample(hit.normal, w_in, rng).map(|scattered| (scattered, false));
+    if reflectance.has_delta() || reflectance.sides().is_some() {
+        return scene.scatter(hit, w_in, rng).map(|scattered| (scattered, false));
     }
     let aim = Aim::new(scene.openings(), hit.position);
     let choice = rng.uniform();
@@ -42,5 +42,5 @@ pub fn scatter(scene: &Scene, hit: &Hit, w_in: DVec3, rng: &mut Generator) -> Op
     let through = aim.density(direction);
     let density = 0.5 * (reflectance.pdf(hit.normal, w_in, direction) + through);
     let factor = reflectance.evaluate(hit.normal, w_in, direction) * (cosine / density);
-    Some((Scattered { direction, factor, delta: false }, through > 0.0))
+    Some((Scattered { direction, factor, delta: false, transmitted: false }, through > 0.0))
 }

@@ -63,7 +63,10 @@ pub struct Connectors {
 impl Connectors {
     /// Appends the vertices of the next history.
     pub fn push(&mut self, scene: &Scene, history: &[Vertex]) {
-        self.all.extend(history.iter().map(|v| connector(scene, v)));
+        for vertex in history {
+            self.all.push(connector(scene, vertex));
+            self.all.extend(transmitting(scene, vertex));
+        }
         self.mirrored |= history.iter().any(|v| v.after_delta);
         self.ends.push(self.all.len());
     }
@@ -101,7 +104,7 @@ impl Connectors {
 
 fn connector(scene: &Scene, v: &Vertex) -> Connector {
     let reflectance = &scene.surface(v.primitive).reflectance;
-    let lambert = reflectance.lambert();
+    let lambert = reflectance.lambert().or(reflectance.sides().map(|(same_side, _)| same_side));
     let narrow = |c: Colour| c.0.map(|c| c as f32);
     Connector {
         position: v.position.as_vec3(),
@@ -118,4 +121,12 @@ fn connector(scene: &Scene, v: &Vertex) -> Connector {
         }),
         emitter: None,
     }
+}
+
+/// What a vertex on a surface that sends light to both sides sends to the other one.
+fn transmitting(scene: &Scene, v: &Vertex) -> Option<Connector> {
+    let (_, tau) = scene.surface(v.primitive).reflectance.sides()?;
+    let intensity = (v.weight * tau / PI).0.map(|c| c as f32);
+    let lifted = scene.geometry.lift(v.position, -v.normal).as_vec3();
+    Some(Connector { lifted, normal: -v.normal.as_vec3(), intensity, ..connector(scene, v) })
 }

@@ -46,7 +46,7 @@ pub struct Continuation {
     /// matt \[lx or cd/m2\]. What they really reflect of it has this order of magnitude and comes in spikes: no
     /// direction can be drawn towards such a source, so that its image in a narrow lobe is met by chance alone.
     pub caustic: f64,
-    /// True where y_1 and the receiver are matt: y_1 then counts in full, as [`super::neighbours`] wants it.
+    /// True where y_1 and the receiver are matt, in a scene without veils: y_1 then counts in full, as [`super::neighbours`] wants it.
     pub shared: bool,
 }
 
@@ -64,13 +64,14 @@ pub fn is_due(scene: &Scene, receiver: &Receiver, bound: f64) -> bool {
 pub fn continue_from(scene: &Scene, receiver: &Receiver, bound: f64, rng: &mut Generator) -> Continuation {
     let mut path = Continuation::default();
     let Some((mut weight, mut found)) = step(scene, receiver, bound, rng) else { return path };
-    path.shared = receiver.response.constant(scene).is_some() && found.is_matt(scene);
+    let may_share = receiver.response.constant(scene, receiver.normal).is_some() && !scene.geometry.has_veils();
+    path.shared = may_share && found.is_matt(scene);
     if path.shared {
         (weight, found.carried) = (Colour::WHITE, 0.0);
     }
     let first = weight.luminance();
     for _ in 0..MAX_POINTS {
-        let next = found.receiver(scene, weight);
+        let next = found.receiver(scene, weight).on_one_side(scene, rng);
         if next.response.is_peaked() {
             path.caustic += from_lights_as_if_matt(scene, &next, rng).luminance();
         }
@@ -124,7 +125,10 @@ fn step(scene: &Scene, at: &Receiver, bound: f64, rng: &mut Generator) -> Option
         // From farther away no factor exceeds b, and the path would end there.
         1.0 / bound.sqrt() * (1.0 + 1e-6) + 2.0 * origin.distance(at.position)
     };
-    let hit = scene.geometry.closest_hit_within(&Ray { origin, direction }, reach).filter(|h| !scene.absorbs(h))?;
+    let first = scene.geometry.closest_hit_within(&Ray { origin, direction }, reach)?;
+    // What a pane mirrors is carried by connections alone, as of every mirror.
+    let (hit, share) = scene.met_from(first, direction, false, rng);
+    let (hit, weight) = (hit.filter(|h| !scene.absorbs(h))?, weight * share);
     let reflectance = &scene.surface(hit.primitive).reflectance;
     if reflectance.is_black() {
         return None;

@@ -56,3 +56,4 @@ mod spherical_triangle;
 mod totals;
 pub mod trajectory;
 mod varying;
+mod veils;

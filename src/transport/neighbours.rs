@@ -35,7 +35,7 @@ impl Neighbours {
     /// The group of `receivers`, at most [`GROUP`], with the bound b of the kernel \[1/m2\].
     pub fn new<'a>(scene: &Scene, receivers: impl Iterator<Item = &'a Receiver>, bound: f64) -> Self {
         let (places, responses): (Vec<_>, Vec<_>) =
-            receivers.map(|r| ((r.position, r.normal), r.response.constant(scene))).unzip();
+            receivers.map(|r| ((r.position, r.normal), r.response.constant(scene, r.normal))).unzip();
         assert!(places.len() <= GROUP, "a group has {GROUP} receivers");
         let lift = |(position, normal): &(DVec3, DVec3)| scene.geometry.lift(*position, *normal).as_vec3();
         let lifted: Vec<Vec3> = places.iter().map(lift).collect();

@@ -8,7 +8,7 @@ use crate::geometry::{Hit, Ray};
 use crate::math::{DVec3, PI, to_world};
 use crate::photometry::Colour;
 use crate::random::{Generator, cosine_hemisphere};
-use crate::scene::{Reflectance, Scene, weight_over_tolerated};
+use crate::scene::{Delta, Reflectance, Scene, weight_over_tolerated};
 
 /// Mirrors that an eye ray follows before it is given up; facing perfect mirrors would be followed for ever.
 const MAX_MIRRORS: u32 = 256;
@@ -22,6 +22,31 @@ pub struct Receiver {
     pub normal: DVec3,
     /// What arriving light is worth.
     pub response: Response,
+}
+
+impl Receiver {
+    /// The receiver of light that arrives on the other side, where the surface sends it through.
+    pub fn behind(&self, scene: &Scene) -> Option<Receiver> {
+        let Response::Reflectance { primitive, .. } = self.response else { return None };
+        let (_, tau) = scene.surface(primitive).reflectance.sides()?;
+        (!tau.is_black()).then_some(Receiver { normal: -self.normal, ..*self })
+    }
+
+    /// This receiver or that behind it, where there is one: one of the two by chance, and its weight over the probability.
+    pub fn on_one_side(self, scene: &Scene, rng: &mut Generator) -> Receiver {
+        let Some(behind) = self.behind(scene) else { return self };
+        let shares = [self, behind].map(|r| r.response.side(scene, r.normal).unwrap_or(Colour::BLACK).luminance());
+        let here = shares[0] / (shares[0] + shares[1]);
+        let (chosen, probability) = if rng.chance(here) { (self, here) } else { (behind, 1.0 - here) };
+        chosen.weighted(1.0 / probability)
+    }
+
+    fn weighted(mut self, factor: f64) -> Receiver {
+        if let Response::Reflectance { attenuation, .. } = &mut self.response {
+            *attenuation *= factor;
+        }
+        self
+    }
 }
 
 /// What light that arrives at a receiver is worth.
@@ -58,15 +83,24 @@ impl Response {
         Response::Reflectance { primitive, to_eye, attenuation, carried, peaked }
     }
 
-    /// The response where it does not depend on the direction of arrival: of lux-meters and Lambert surfaces.
-    pub fn constant(&self, scene: &Scene) -> Option<Colour> {
+    /// The response at a receiver with `normal` where it does not depend on the direction of arrival: of lux-meters, Lambert and opal
+    /// surfaces.
+    pub fn constant(&self, scene: &Scene, normal: DVec3) -> Option<Colour> {
         match self {
             Response::Cosine => Some(Colour::WHITE),
             Response::Reflectance { primitive, attenuation, carried, .. } => {
-                let rho = scene.surface(*primitive).reflectance.lambert()?;
+                let rho = self.side(scene, normal).or(scene.surface(*primitive).reflectance.lambert())?;
                 Some(rho * *attenuation * (left(*carried, 1.0) / PI))
             }
         }
+    }
+
+    /// On a surface that sends light to both sides, what it sends to the eye of the light that arrives on the side of `normal`: it
+    /// reflects towards an eye on this side, and transmits towards one on the other.
+    pub fn side(&self, scene: &Scene, normal: DVec3) -> Option<Colour> {
+        let Response::Reflectance { primitive, to_eye, .. } = self else { return None };
+        let (rho, tau) = scene.surface(*primitive).reflectance.sides()?;
+        Some(if to_eye.dot(normal) > 0.0 { rho } else { tau })
     }
 
     /// The response to light with propagation direction `w_in` at a receiver with `normal`.
@@ -108,6 +142,10 @@ impl Response {
         match self {
             Response::Cosine => Some((to_world(normal, cosine_hemisphere(rng.uniform2())), Colour::grey(PI))),
             Response::Reflectance { primitive, to_eye, attenuation, carried, .. } => {
+                if let Some(colour) = self.side(scene, normal) {
+                    let direction = to_world(normal, cosine_hemisphere(rng.uniform2()));
+                    return Some((direction, colour * *attenuation * left(*carried, 1.0)));
+                }
                 let reflectance = &scene.surface(*primitive).reflectance;
                 // Laws are reciprocal: light sent back from the eye leaves in the directions that the eye receives.
                 let scattered = reflectance.sample(normal, -*to_eye, rng).filter(|s| !s.delta)?;
@@ -143,28 +181,53 @@ pub struct Seen {
     pub emitted: Colour,
     /// The reflecting surface point where luminance is wanted.
     pub receiver: Option<Receiver>,
+    /// The same point for light that arrives on its other side and is sent through it.
+    pub behind: Option<Receiver>,
+}
+
+impl Seen {
+    /// Nothing.
+    pub const NOTHING: Seen = Seen { emitted: Colour::BLACK, receiver: None, behind: None };
 }
 
 /// Follows an eye ray over mirrors to the first point with a finite law of reflection.
 pub fn look(scene: &Scene, ray: &Ray, rng: &mut Generator) -> Seen {
     match scene.geometry.closest_hit(ray) {
         Some(hit) => look_at(scene, hit, ray.direction, rng),
-        None => Seen { emitted: scene.beyond(ray.direction), receiver: None },
+        None => Seen { emitted: scene.beyond(ray.direction), ..Seen::NOTHING },
     }
 }
 
 /// The same for an eye ray with `direction` that has met `hit`.
 ///
-/// At a surface that has both a mirror and a finite part one of them is drawn, in proportion to their reflectance.
+/// Veils are looked through. At a surface that has both a mirror and a finite part one of them is drawn, in proportion to their reflectance.
 pub fn look_at(scene: &Scene, mut hit: Hit, mut direction: DVec3, rng: &mut Generator) -> Seen {
-    let mut seen = Seen { emitted: Colour::BLACK, receiver: None };
+    let mut seen = Seen::NOTHING;
     let mut attenuation = Colour::WHITE;
     for _ in 0..MAX_MIRRORS {
+        let (met, share) = scene.met_from(hit, direction, true, rng);
+        let Some(met) = met else {
+            seen.emitted += attenuation * share * scene.beyond(direction);
+            break;
+        };
+        (hit, attenuation) = (met, attenuation * share);
         if scene.absorbs(&hit) {
             break;
         }
         let surface = scene.surface(hit.primitive);
         seen.emitted += attenuation * scene.emitted(&hit, -direction);
+        if matches!(surface.reflectance, Reflectance::Delta(Delta::Glass(_))) {
+            let Some(scattered) = scene.scatter_eye_ray(&hit, direction, rng) else { break };
+            (attenuation, direction) = (attenuation * scattered.factor, scattered.direction);
+            match scene.geometry.closest_hit(&scene.leaving(&hit, &scattered)) {
+                Some(next) => hit = next,
+                None => {
+                    seen.emitted += attenuation * scene.beyond(direction);
+                    break;
+                }
+            }
+            continue;
+        }
         let cosine = -direction.dot(hit.normal);
         let mirror = surface.reflectance.delta_reflectance(cosine);
         let follow = mirror.map_or(0.0, |f| follow_probability(&surface.reflectance, f, cosine));
@@ -172,6 +235,7 @@ pub fn look_at(scene: &Scene, mut hit: Hit, mut direction: DVec3, rng: &mut Gene
         let stops = follow == 0.0 || (follow < 1.0 && rng.uniform() >= follow);
         if stops {
             seen.receiver = receiver(scene, &hit, direction, attenuation / (1.0 - follow));
+            seen.behind = seen.receiver.as_ref().and_then(|r| r.behind(scene));
             break;
         }
         attenuation = attenuation * mirror.unwrap_or(Colour::BLACK) / follow;

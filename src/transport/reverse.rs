@@ -27,7 +27,7 @@ use crate::job::{Roulette, Transport};
 use crate::math::{DVec3, PI, to_world};
 use crate::photometry::Colour;
 use crate::random::{Generator, cosine_hemisphere};
-use crate::scene::{Light, Scene};
+use crate::scene::{Light, Scattered, Scene};
 
 /// Guard against paths that never end.
 const MAX_VERTICES: u32 = 1 << 16;
@@ -50,7 +50,12 @@ pub fn path(scene: &Scene, transport: &Transport, receiver: &Receiver, rng: &mut
     let first = weight.luminance();
     for met in 1..=MAX_VERTICES {
         let emitted = if met == 1 { &mut found.direct } else { &mut found.reflected };
-        let Some(hit) = scene.geometry.closest_hit(&ray) else {
+        let (hit, share) = match scene.geometry.closest_hit(&ray) {
+            Some(hit) => scene.met_from(hit, ray.direction, true, rng),
+            None => (None, Colour::WHITE),
+        };
+        weight = weight * share;
+        let Some(hit) = hit else {
             *emitted += weight * scene.beyond(ray.direction);
             break;
         };
@@ -62,18 +67,22 @@ pub fn path(scene: &Scene, transport: &Transport, receiver: &Receiver, rng: &mut
         let response = |w_in| surface.reflectance.evaluate(hit.normal, w_in, back);
         *emitted += weight * scene.emitted(&hit, back);
         found.reflected += weight * from_lights(scene, hit.position, hit.normal, response);
+        if surface.reflectance.sides().is_some() {
+            let transmitted = |w_in| surface.reflectance.evaluate(-hit.normal, w_in, back);
+            found.reflected += weight * from_lights(scene, hit.position, -hit.normal, transmitted);
+        }
         if surface.reflectance.is_peaked_at(back.dot(hit.normal)) {
             let matt = |w_in: DVec3| surface.reflectance.albedo(-w_in.dot(hit.normal)) / PI;
             found.caustic += weight * from_lights(scene, hit.position, hit.normal, matt);
         }
-        let Some(next) = surface.reflectance.sample(hit.normal, ray.direction, rng) else { break };
+        let Some(next) = scene.scatter_eye_ray(&hit, ray.direction, rng) else { break };
         // No connection carries what a mirror sends straight to the receiver.
         if met == 1 && next.delta {
             break;
         }
         let Some(survivor) = play(transport.roulette_below, first, weight, weight * next.factor, rng) else { break };
         weight = survivor;
-        ray = Ray { origin: scene.geometry.lift(hit.position, hit.normal), direction: next.direction };
+        ray = scene.leaving(&hit, &next);
     }
     found
 }
@@ -94,7 +103,13 @@ fn leave(scene: &Scene, receiver: &Receiver, rng: &mut Generator) -> Option<(Ray
     let (direction, weight) = match receiver.response {
         Response::Cosine => (to_world(normal, cosine_hemisphere(rng.uniform2())), Colour::grey(PI)),
         Response::Reflectance { primitive, to_eye, attenuation, .. } => {
-            let drawn = scene.surface(primitive).reflectance.sample(normal, -to_eye, rng)?;
+            let drawn = match receiver.response.side(scene, normal) {
+                Some(colour) => {
+                    let direction = to_world(normal, cosine_hemisphere(rng.uniform2()));
+                    Scattered { direction, factor: colour, delta: false, transmitted: false }
+                }
+                None => scene.surface(primitive).reflectance.sample(normal, -to_eye, rng)?,
+            };
             (!drawn.delta).then_some((drawn.direction, attenuation * drawn.factor))?
         }
     };
@@ -109,19 +124,21 @@ fn from_lights(scene: &Scene, position: DVec3, normal: DVec3, response: impl Fn(
     for light in &scene.sources.lights {
         let (_, w_in, across) = light.at(position);
         let cosine = -normal.dot(w_in);
-        if cosine > 0.0 && !across.is_black() && is_lit(scene, lifted, light) {
-            sum += across * cosine * response(w_in);
+        if cosine > 0.0 && !across.is_black() {
+            sum += across * lit(scene, lifted, light) * cosine * response(w_in);
         }
     }
     sum
 }
 
-/// True when nothing stands between the lifted point and `light`: a ray, not the segments of the connections.
-fn is_lit(scene: &Scene, lifted: DVec3, light: &Light) -> bool {
+/// The share of light that gets from `light` to the lifted point: a ray, not the segments of the connections.
+fn lit(scene: &Scene, lifted: DVec3, light: &Light) -> Colour {
     let (from, w_in, _) = light.at(lifted);
     let distance = from.map_or(f64::INFINITY, |p| (p - lifted).length());
-    let hit = scene.geometry.closest_hit(&Ray { origin: lifted, direction: -w_in });
-    hit.is_none_or(|h| h.distance >= distance)
+    match scene.straight(&Ray { origin: lifted, direction: -w_in }, distance) {
+        (Some(hit), _) if hit.distance < distance => Colour::BLACK,
+        (_, share) => share,
+    }
 }
 
 /// Russian roulette: the weight T_{k+1} with which the path goes on, or `None` where it ends; `first` is the luminous

@@ -1,7 +1,7 @@
 //! Direct light of the sky at a receiver.
 //!
 //! ```text
-//! E_sky(r) = int L(v) (N_r,v)_+ V dw  =  1/n sum_i  L(v_i) (N_r,v_i) / q(v_i)   over those v_i along which nothing stands
+//! E_sky(r) = int L(v) (N_r,v)_+ V dw  =  1/n sum_i  L(v_i) (N_r,v_i) / q(v_i)   over those v_i along which nothing stands but veils
 //! q(v)     = c p'(v) + (1 - c) sum_k b_k d_k^2/(A_k |cos_k|)
 //! ```
 //!
@@ -10,7 +10,7 @@
 //! the estimate is unbiased, and bounded beside them. A peaked response looks at the sky as well, and the two are weighed by the balance
 //! heuristic, as for area lights ([`super::direct`]). The directions of a receiver fill their square evenly, with a random shift.
 
-use super::direct::density_of_response;
+use super::direct::{density_of_response, from_afar};
 use super::receiver::Receiver;
 use crate::geometry::Ray;
 use crate::math::{DVec2, DVec3};
@@ -31,8 +31,15 @@ pub fn from_sky(scene: &Scene, receiver: &Receiver, samples: u64, rng: &mut Gene
     let rays: Vec<Ray> = directions.iter().map(ray).collect();
     let mut hits = vec![None; rays.len()];
     scene.geometry.closest_hits(&rays, &mut hits);
-    let open = directions.iter().zip(&hits).filter(|(_, hit)| hit.is_none());
-    let mut sum: Colour = open.map(|(&v, _)| view.light(v)).sum();
+    let veiled = scene.geometry.has_veils();
+    let mut sum = Colour::BLACK;
+    for (ray, hit) in rays.iter().zip(&hits) {
+        match hit {
+            None => sum += view.light(ray.direction),
+            Some(_) if veiled => sum += from_afar(scene, ray) * view.light(ray.direction),
+            Some(_) => {}
+        }
+    }
     if receiver.response.is_peaked() {
         for _ in 0..samples {
             sum += view.where_the_response_looks(rng);
@@ -95,10 +102,11 @@ impl<'a> View<'a> {
     fn where_the_response_looks(&self, rng: &mut Generator) -> Colour {
         let Receiver { normal, response, .. } = self.receiver;
         let Some((v, weight)) = response.sample(self.scene, *normal, rng) else { return Colour::BLACK };
-        if self.scene.geometry.closest_hit(&Ray { origin: self.from, direction: v }).is_some() {
+        let share = from_afar(self.scene, &Ray { origin: self.from, direction: v });
+        if share.is_black() {
             return Colour::BLACK;
         }
         let density = density_of_response(self.scene, self.receiver, -v);
-        self.sky.luminance(v) * weight * (density / (density + self.density(v)))
+        self.sky.luminance(v) * share * weight * (density / (density + self.density(v)))
     }
 }

@@ -18,6 +18,7 @@ mod direct;
 mod document;
 pub mod experiment;
 mod form_factors;
+mod glass;
 mod luminaires;
 mod openings;
 pub mod reference;
@@ -84,7 +85,7 @@ impl Case {
 /// All cases, in order.
 pub fn cases() -> Vec<Case> {
     let themes = [direct::cases(), form_factors::cases(), cavities::cases(), bounces::cases()];
-    let themes = themes.into_iter().flatten().chain(cube::cases()).chain(sobolev::cases());
+    let themes = themes.into_iter().flatten().chain(cube::cases()).chain(glass::cases()).chain(sobolev::cases());
     themes.chain(luminaires::cases()).chain(openings::cases()).chain(daylight::cases()).collect()
 }
 

@@ -4,12 +4,13 @@ use lampyris::validate;
 use std::process::{Command, Output};
 
 /// Beginnings of the names of all cases; each is run by one test.
-pub const THEMES: [&str; 10] = [
+pub const THEMES: [&str; 11] = [
     "direct/",
     "form-factor/",
     "cavity/",
     "bounce/",
     "cube/",
+    "glass/",
     "sobolev/",
     "luminaire/",
     "opening/",

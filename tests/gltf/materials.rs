@@ -2,10 +2,10 @@
 
 use serde_json::{Value, json};
 
-use crate::{Builder, CORNERS, SQUARE, good, warns};
+use crate::{Builder, CORNERS, SQUARE, good, load, refusal, warns};
 use lampyris::math::pow;
 use lampyris::photometry::Colour;
-use lampyris::scene::Model;
+use lampyris::scene::{Delta, Model, Pane, Reflectance};
 
 /// A square of `material`.
 fn square(material: Value) -> Builder {
@@ -178,4 +178,48 @@ fn a_material_that_nothing_shows_cannot_fail() {
     let mut builder = square(json!({}));
     builder.push("/materials", textured());
     assert_eq!(good(&builder).surfaces.len(), 1);
+}
+
+#[test]
+fn what_transmits_is_glass() {
+    let glass = |extensions: Value, roughness: f64| {
+        let factors =
+            json!({ "metallicFactor": 0.0, "roughnessFactor": roughness, "baseColorFactor": [0.9, 0.8, 0.7, 1.0] });
+        square(json!({ "name": "window", "pbrMetallicRoughness": factors, "extensions": extensions }))
+    };
+    let clear =
+        json!({ "KHR_materials_transmission": { "transmissionFactor": 1.0 }, "KHR_materials_ior": { "ior": 1.6 } });
+    let model = good(&glass(clear.clone(), 0.0));
+    let pane = Pane::new(1.6, Colour([0.9, 0.8, 0.7]));
+    let surface = &model.surfaces[0];
+    assert!(matches!(&surface.reflectance, Reflectance::Delta(Delta::Pane(found)) if *found == pane));
+    assert!(surface.double_sided && surface.is_veil() && model.warnings.is_empty(), "{:?}", model.warnings);
+    assert!(warns(&good(&glass(clear.clone(), 0.5)), "roughnessFactor is ignored"));
+
+    let mut thick = clear.clone();
+    thick["KHR_materials_volume"] =
+        json!({ "thicknessFactor": 0.1, "attenuationDistance": 2.0, "attenuationColor": [0.25, 1.0, 1.0] });
+    let model = good(&glass(thick.clone(), 0.0));
+    let Reflectance::Delta(Delta::Glass(body)) = &model.surfaces[0].reflectance else { panic!("a body of glass") };
+    assert_close(body.left(1.0), [0.5, 1.0, 1.0]);
+    assert!(!model.surfaces[0].is_veil());
+
+    let some = json!({ "KHR_materials_transmission": { "transmissionFactor": 0.5 } });
+    assert!(warns(&good(&glass(some, 0.0)), "it is opaque"));
+    let none = json!({ "KHR_materials_transmission": {} });
+    assert!(good(&glass(none, 0.0)).warnings.is_empty());
+    for (extensions, field) in [
+        (json!({ "KHR_materials_transmission": { "transmissionFactor": 1.5 } }), "transmissionFactor"),
+        (json!({ "KHR_materials_transmission": {}, "KHR_materials_ior": { "ior": 0.5 } }), "ior"),
+    ] {
+        refused(&glass(extensions, 0.0), field);
+    }
+    thick["KHR_materials_volume"]["attenuationDistance"] = json!(0.0);
+    refused(&glass(thick, 0.0), "attenuationDistance");
+}
+
+/// Asserts that `builder` is refused for a field with the word `word`.
+fn refused(builder: &Builder, word: &str) {
+    let (field, ..) = refusal(load(&builder.glb()));
+    assert!(field.contains(word), "{field}");
 }

@@ -1,6 +1,7 @@
-//! The metallic-roughness law against integrals of itself: energy, reciprocity, special cases, hard numbers.
+//! Laws of reflection against integrals of themselves: energy, reciprocity, special cases, hard numbers.
 
 mod lanes;
+mod laws;
 mod quadrature;
 mod sampling;
 

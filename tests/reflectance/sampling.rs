@@ -31,19 +31,19 @@ const CASES: [(f64, f64, f64); 10] = [
 ];
 
 /// Chi-square of one set of draws over the cells of half vectors, with its critical value.
-struct Fit {
-    statistic: f64,
-    critical: f64,
+pub struct Fit {
+    pub statistic: f64,
+    pub critical: f64,
 }
 
 impl Fit {
-    fn holds(&self) -> bool {
+    pub fn holds(&self) -> bool {
         self.statistic <= self.critical
     }
 }
 
 /// Compares `draw` (None: not a finite continuation) with the density `pdf`; the missing mass is a cell of its own.
-fn fit(at: &Incidence, pdf: impl Fn(DVec3) -> f64, mut draw: impl FnMut() -> Option<DVec3>) -> Fit {
+pub fn fit(at: &Incidence, pdf: impl Fn(DVec3) -> f64, mut draw: impl FnMut() -> Option<DVec3>) -> Fit {
     let panels = at.polar.len() - 1;
     // The horizon cuts the wide panels of a rough surface, where the density jumps to zero.
     let parts = if panels < 10 { (40, 40) } else { (12, 12) };

@@ -47,10 +47,13 @@ impl Block<'_> {
     /// Draws the continuations of the receivers that need them, and adds the light that comes by them.
     pub(super) fn add_continuations(&self, sensed: &[Sensed], scores: &mut [Score]) {
         let all = self.histories.histories();
-        let may_share = self.set.shape().bins() >= GROUP && !self.scene.has_peaks();
+        let may_share = self.set.shape().bins() >= GROUP && !self.scene.has_peaks() && !self.scene.geometry.has_veils();
         let groups = (all / HISTORIES_OF_A_PATH[usize::from(may_share)]).max(1);
-        let mut continued: Vec<Continued> =
-            (0..sensed.len()).into_par_iter().filter_map(|i| self.continued(&sensed[i], i, groups)).collect();
+        let of_bin = |i: usize| {
+            let both = [sensed[i].receiver, sensed[i].behind].into_iter().flatten();
+            both.filter_map(move |receiver| self.continued(receiver, i, groups))
+        };
+        let mut continued: Vec<Continued> = (0..sensed.len()).into_par_iter().flat_map_iter(of_bin).collect();
         if continued.is_empty() {
             return;
         }
@@ -74,12 +77,15 @@ impl Block<'_> {
         }
     }
 
-    /// What is continued of the bin number `owner` of the block, if anything.
-    fn continued(&self, sensed: &Sensed, owner: usize, groups: usize) -> Option<Continued> {
-        let receiver = sensed.receiver.filter(|r| is_due(self.scene, r, self.rule.bound))?;
+    /// A receiver of the bin number `owner` of the block, if it is continued.
+    fn continued(&self, receiver: Receiver, owner: usize, groups: usize) -> Option<Continued> {
         let bin = self.bins[owner];
-        let paths = self.set.continuations(bin, self.batch, groups);
-        Some(Continued { owner: owner as u32, receiver, paths, watched: self.is_watched(bin) })
+        is_due(self.scene, &receiver, self.rule.bound).then(|| Continued {
+            owner: owner as u32,
+            receiver,
+            paths: self.set.continuations(bin, self.batch, groups),
+            watched: self.is_watched(bin),
+        })
     }
 
     fn draw(&self, continued: &mut Continued) -> Path {

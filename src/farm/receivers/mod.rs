@@ -278,7 +278,7 @@ fn gaze(scene: &Scene, eye: &Eye, film: DVec2, rng: &mut Generator) -> Seen {
     match eye.gaze(film) {
         Gaze::Along(ray) => look(scene, &ray, rng),
         Gaze::At(hit, direction) => look_at(scene, hit, direction, rng),
-        Gaze::Nowhere => Seen { emitted: Colour::BLACK, receiver: None },
+        Gaze::Nowhere => Seen::NOTHING,
     }
 }
 

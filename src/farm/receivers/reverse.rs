@@ -56,8 +56,9 @@ impl ReceiverSet {
             Bins::Film { eye, .. } => {
                 let film = self.draw(eye, stratum, bin, rng);
                 let seen = gaze(scene, eye, film, rng);
-                let lit = seen.receiver.map_or(Colour::BLACK, |r| lights_at(scene, &r));
-                (seen.emitted + lit, seen.receiver)
+                let receiver = seen.receiver.map(|r| r.on_one_side(scene, rng));
+                let lit = receiver.map_or(Colour::BLACK, |r| lights_at(scene, &r));
+                (seen.emitted + lit, receiver)
             }
         }
     }

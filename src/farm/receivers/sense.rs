@@ -28,13 +28,15 @@ pub struct Sensed {
     pub direct: Colour,
     /// Where the histories are connected to.
     pub receiver: Option<Receiver>,
+    /// The same for light that arrives on the other side of an opal surface.
+    pub behind: Option<Receiver>,
     /// Whether a surface that reflects was there.
     pub existed: bool,
 }
 
 impl Sensed {
     fn nothing() -> Self {
-        Sensed { direct: Colour::BLACK, receiver: None, existed: false }
+        Sensed { direct: Colour::BLACK, receiver: None, behind: None, existed: false }
     }
 }
 
@@ -89,7 +91,7 @@ impl ReceiverSet {
         let light = self.light(scene, &receivers, rngs, shared, (0, channels));
         let sensed = |(receiver, direct): (Option<Receiver>, Colour)| {
             // In a scene without reflection there is nothing to wait for beyond direct light.
-            Sensed { direct, receiver, existed: receiver.is_some() && scene.reflects() }
+            Sensed { direct, receiver, behind: None, existed: receiver.is_some() && scene.reflects() }
         };
         receivers.into_iter().zip(light).map(sensed).collect()
     }
@@ -111,11 +113,16 @@ impl ReceiverSet {
             let seen = self.look(scene, bins, eye, stratum, rngs);
             let receivers: Vec<Option<Receiver>> = seen.iter().map(|s| s.receiver).collect();
             let light = self.light(scene, &receivers, rngs, shared, (lamps, channels));
+            let behind: Vec<Option<Receiver>> = seen.iter().map(|s| s.behind).collect();
+            if behind.iter().any(Option::is_some) {
+                let through = self.light(scene, &behind, rngs, shared, (lamps, channels));
+                sensed.iter_mut().zip(through).for_each(|(sensed, through)| sensed.direct += through);
+            }
             for (i, (seen, light)) in seen.iter().zip(light).enumerate() {
                 sensed[i].direct += seen.emitted + light;
                 sensed[i].existed |= seen.receiver.is_some();
                 if stratum == carrying[i] {
-                    sensed[i].receiver = seen.receiver;
+                    (sensed[i].receiver, sensed[i].behind) = (seen.receiver, seen.behind);
                 }
             }
         }
@@ -135,11 +142,11 @@ impl ReceiverSet {
             let (hit, direction) = match gaze {
                 Gaze::Along(ray) => (hits.next().flatten(), ray.direction),
                 Gaze::At(hit, direction) => (Some(*hit), *direction),
-                Gaze::Nowhere => return Seen { emitted: Colour::BLACK, receiver: None },
+                Gaze::Nowhere => return Seen::NOTHING,
             };
             match hit {
                 Some(hit) => look_at(scene, hit, direction, rng),
-                None => Seen { emitted: scene.beyond(direction), receiver: None },
+                None => Seen { emitted: scene.beyond(direction), ..Seen::NOTHING },
             }
         };
         gazes.iter().zip(rngs).map(&mut see).collect()

@@ -241,6 +241,40 @@ impl Default for MetallicRoughness {
 pub struct MaterialExtensions {
     #[serde(rename = "KHR_materials_emissive_strength")]
     pub emissive_strength: Option<EmissiveStrength>,
+    #[serde(rename = "KHR_materials_transmission")]
+    pub transmission: Option<Transmission>,
+    #[serde(rename = "KHR_materials_ior")]
+    pub ior: Option<Ior>,
+    #[serde(rename = "KHR_materials_volume")]
+    pub volume: Option<Volume>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub struct Transmission {
+    #[serde(default)]
+    pub transmission_factor: f64,
+    pub transmission_texture: Option<TextureReference>,
+}
+
+#[derive(Deserialize)]
+pub struct Ior {
+    #[serde(default = "index_of_glass")]
+    pub ior: f64,
+}
+
+fn index_of_glass() -> f64 {
+    1.5
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub struct Volume {
+    #[serde(default)]
+    pub thickness_factor: f64,
+    pub attenuation_distance: Option<f64>,
+    #[serde(default = "white")]
+    pub attenuation_color: [f64; 3],
 }
 
 #[derive(Deserialize)]

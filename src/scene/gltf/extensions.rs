@@ -5,8 +5,15 @@ use super::problem::{File, Warnings};
 use crate::error::Result;
 
 /// Extensions whose meaning is followed.
-const SUPPORTED: [&str; 4] =
-    ["KHR_lights_punctual", "EXT_lights_ies", "KHR_materials_emissive_strength", "KHR_mesh_quantization"];
+const SUPPORTED: [&str; 7] = [
+    "KHR_lights_punctual",
+    "EXT_lights_ies",
+    "KHR_materials_emissive_strength",
+    "KHR_mesh_quantization",
+    "KHR_materials_transmission",
+    "KHR_materials_ior",
+    "KHR_materials_volume",
+];
 
 /// Refuses a file that needs an extension not understood; lists those it merely uses, with the effect.
 pub fn check(file: File, document: &Document, warnings: &mut Warnings) -> Result<()> {
@@ -31,10 +38,9 @@ fn effect(name: &str) -> Option<&'static str> {
         "KHR_xmp" | "KHR_xmp_json_ld" => return None,
         "KHR_texture_transform" => "a texture counts by its mean colour, wherever it is laid",
         "KHR_materials_unlit" => "its materials reflect by their metallic-roughness factors",
-        "KHR_materials_ior" => "the specular reflectance at normal incidence stays 0.04",
         "KHR_materials_specular" => "the specular part of a dielectric keeps its full strength and no colour",
-        "KHR_materials_transmission" | "KHR_materials_diffuse_transmission" => "its materials are opaque",
-        "KHR_materials_volume" | "KHR_materials_dispersion" => "its materials are opaque",
+        "KHR_materials_diffuse_transmission" => "its materials are opaque",
+        "KHR_materials_dispersion" => "glass refracts all colours alike",
         "KHR_materials_clearcoat" => "no clear coat lies over its materials",
         "KHR_materials_sheen" => "its materials have no sheen",
         "KHR_materials_anisotropy" => "reflection is isotropic",

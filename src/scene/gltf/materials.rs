@@ -3,6 +3,7 @@
 //! A material is read when the first surface with it is met, so that what the scene does not show cannot fail.
 
 use super::document::{Document, Material, TextureReference};
+use super::glass::glass;
 use super::images::{Images, Mean};
 use super::problem::{File, Warnings};
 use crate::error::Result;
@@ -66,7 +67,9 @@ impl<'a> Materials<'a> {
         note_ignored(material, &name, warnings);
         let reflectance = self.reflectance(material, &path, &name, warnings)?;
         let emission = self.emission(material, &path, &name, warnings)?;
-        Ok(Surface { name, reflectance, double_sided: material.double_sided, emission })
+        // Glass has no back.
+        let double_sided = material.double_sided || matches!(reflectance, Reflectance::Delta(_));
+        Ok(Surface { name, reflectance, double_sided, emission })
     }
 
     /// Law of reflection by the factors times the means of the textures.
@@ -87,11 +90,12 @@ impl<'a> Materials<'a> {
         let base = self.mean(&factors.base_color_texture, &path, "baseColorTexture", name, warnings)?;
         let data = self.mean(&factors.metallic_roughness_texture, &path, "metallicRoughnessTexture", name, warnings)?;
         let [_, rough, metal] = data.stored;
-        Ok(Reflectance::metallic_roughness(
-            Colour([r, g, b]) * Colour(base.colour),
-            metallic * metal,
-            roughness * rough,
-        ))
+        let colour = Colour([r, g, b]) * Colour(base.colour);
+        let place = (path.trim_end_matches(".pbrMetallicRoughness"), name);
+        if let Some(glass) = glass(self.file, material, place, colour, warnings)? {
+            return Ok(glass);
+        }
+        Ok(Reflectance::metallic_roughness(colour, metallic * metal, roughness * rough))
     }
 
     /// Emitted luminance \[cd/m2\].

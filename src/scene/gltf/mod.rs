@@ -9,12 +9,13 @@
 //! model or an [`Error::Input`](crate::error::Error::Input) that names the field, never a panic.
 //!
 //! The order of the work, a file each: container and JSON (`document`), `extensions`, `buffers`, `nodes`, and at each
-//! node its mesh (`meshes`, `materials`, `images`), camera (`cameras`) and lights (`lights`, `ies`).
+//! node its mesh (`meshes`, `materials`, `glass`, `images`), camera (`cameras`) and lights (`lights`, `ies`).
 
 mod buffers;
 mod cameras;
 mod document;
 mod extensions;
+mod glass;
 mod ies;
 mod images;
 mod lights;

@@ -188,7 +188,12 @@ impl Glossy {
                 Specular::Mirror => {
                     // Renormalised, so that a long chain of mirrors does not drift off the unit sphere.
                     let direction = (w_in + 2.0 * mu * normal).normalize();
-                    return Some(Scattered { direction, factor: self.fresnel(mu) / share, delta: true });
+                    return Some(Scattered {
+                        direction,
+                        factor: self.fresnel(mu) / share,
+                        delta: true,
+                        transmitted: false,
+                    });
                 }
                 Specular::Rough(facets, _) => rough_direction(facets, normal, w_in, rng)?,
             }
@@ -196,7 +201,7 @@ impl Glossy {
         let pair = Pair::new(normal, w_in, direction)?;
         let density = self.density(&pair, share);
         let factor = self.finite(&pair, albedo) * (pair.leaving / density);
-        (density > 0.0).then_some(Scattered { direction, factor, delta: false })
+        (density > 0.0).then_some(Scattered { direction, factor, delta: false, transmitted: false })
     }
 
     /// Directional albedo of the whole law.

@@ -8,6 +8,7 @@
 
 use super::PEAK;
 use super::albedo::{Coefficients, INTERVALS};
+use super::directional::{Directional, one_by_one};
 use crate::geometry::simd::Vector;
 use crate::geometry::simd::exact::{Triple, add, cross, dot};
 use crate::math::PI;
@@ -23,6 +24,8 @@ pub struct LawInLanes {
     diffuse: [f32; 3],
     has_diffuse: bool,
     specular: Specular,
+    /// A law of another kind, evaluated lane by lane.
+    other: Option<Box<Directional>>,
 }
 
 #[derive(Clone, Debug)]
@@ -50,9 +53,14 @@ impl LawInLanes {
         Self::new(f0, diffuse, Specular::Rough { alpha2: alpha2 as f32, intervals })
     }
 
+    /// The law of another kind.
+    pub(super) fn one_by_one(law: Directional) -> Self {
+        LawInLanes { other: Some(Box::new(law)), ..Self::mirror(Colour::BLACK, Colour::BLACK) }
+    }
+
     fn new(f0: Colour, diffuse: Colour, specular: Specular) -> Self {
         let narrow = |c: Colour| c.0.map(|c| c as f32);
-        LawInLanes { f0: narrow(f0), diffuse: narrow(diffuse), has_diffuse: !diffuse.is_black(), specular }
+        LawInLanes { f0: narrow(f0), diffuse: narrow(diffuse), has_diffuse: !diffuse.is_black(), specular, other: None }
     }
 
     /// f in `C` channels without the delta component \[1/sr\]; 0 where a direction lies below the surface. Both directions are
@@ -65,6 +73,9 @@ impl LawInLanes {
         (one, through): (&Triple<V>, &[V; C]),
         other: &Triple<V>,
     ) -> [V; C] {
+        if let Some(law) = &self.other {
+            return lane_by_lane(law, normal, one, other);
+        }
         let zero = V::splat(0.0);
         let cosines = [dot(normal, one), dot(normal, other)];
         let above = zero.less(cosines[0]) & zero.less(cosines[1]);
@@ -142,6 +153,28 @@ impl LawInLanes {
         let value = |k: usize| V::load(&columns[k]).add(V::load(&columns[k + 2]).mul(rest));
         [value(0), value(1)]
     }
+}
+
+/// f by plain code.
+#[inline(always)]
+fn lane_by_lane<V: Vector<Array = [f32; 16]>, const C: usize>(
+    law: &Directional,
+    normal: &Triple<V>,
+    one: &Triple<V>,
+    other: &Triple<V>,
+) -> [V; C] {
+    let mut stored = [[[0.0; 16]; 3]; 3];
+    for axis in 0..3 {
+        normal[axis].store(&mut stored[0][axis]);
+        one[axis].store(&mut stored[1][axis]);
+        other[axis].store(&mut stored[2][axis]);
+    }
+    let values = one_by_one::<C>(law, &stored[0], &stored[1], &stored[2]);
+    let mut f = [V::splat(0.0); C];
+    for c in 0..C {
+        f[c] = V::load(&values[c]);
+    }
+    f
 }
 
 /// How many times the tolerated weight connections with these values of `f` have, at least 1.

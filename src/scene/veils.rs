@@ -1,0 +1,158 @@
+//! Surfaces that let light through straight on: what is left of it, and where it is met.
+//!
+//! Light that goes straight through a veil stays on its segment: visibility becomes a transmittance, and no vertex, no
+//! reflection and no delta scatterer is counted. What is not let through is *met*: the surface's law of reflection has it, and
+//! its albedo is a share of what is met.
+
+use super::{Delta, Reflectance, Scattered, Scene, Surface};
+use crate::geometry::{Hit, Ray};
+use crate::math::{DVec3, Vec3};
+use crate::photometry::Colour;
+use crate::random::Generator;
+
+/// Guard against rays that never end among veils.
+const MAX_VEILS: u32 = 1 << 16;
+
+/// What becomes of light, or of an eye ray, at a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Meeting {
+    /// It goes straight on, with this share of its weight.
+    Through(Colour),
+    /// The surface's law of reflection decides, with this share of its weight.
+    Met(Colour),
+}
+
+impl Surface {
+    /// True when it lets light through straight on, at least somewhere.
+    pub fn is_veil(&self) -> bool {
+        matches!(self.reflectance, Reflectance::Delta(Delta::Pane(_)))
+    }
+
+    /// The share of light that goes straight on through it; `primitive` and `position` tell where, `cosine` is that of incidence, above 0.
+    fn transmittance(&self, _primitive: u32, _position: DVec3, cosine: f64) -> Colour {
+        match &self.reflectance {
+            Reflectance::Delta(Delta::Pane(pane)) => pane.transmittance(cosine),
+            _ => Colour::BLACK,
+        }
+    }
+}
+
+impl Scene {
+    /// The share of light that goes straight on through the surface `primitive` \[1\].
+    pub fn let_through(&self, primitive: u32, position: DVec3, cosine: f64) -> Colour {
+        self.surface(primitive).transmittance(primitive, position, cosine)
+    }
+
+    /// The share of light that gets straight from one lifted point to another: 0 where a surface blocks, 1 where nothing is between.
+    pub fn transmittance(&self, a: Vec3, b: Vec3) -> Colour {
+        if self.geometry.visible(a, b) { self.veiled(a, b) } else { Colour::BLACK }
+    }
+
+    /// The same of the veils alone.
+    pub fn veiled(&self, a: Vec3, b: Vec3) -> Colour {
+        let mut share = Colour::WHITE;
+        self.geometry.veils_between(a, b, |c| share = share * self.let_through(c.primitive, c.position, c.cosine));
+        share
+    }
+
+    /// The first surface along `ray` that lets nothing through, where it is at most `limit` away \[m\], and the share of light that goes
+    /// straight from the one to the other.
+    pub fn straight(&self, ray: &Ray, limit: f64) -> (Option<Hit>, Colour) {
+        let (mut ray, mut share, mut gone) = (*ray, Colour::WHITE, 0.0);
+        for _ in 0..MAX_VEILS {
+            let Some(hit) = self.geometry.closest_hit_within(&ray, limit - gone) else { return (None, share) };
+            let here = Hit { distance: gone + hit.distance, ..hit };
+            let cosine = -ray.direction.dot(hit.normal);
+            if !self.surface(hit.primitive).is_veil() {
+                return (Some(here), share);
+            }
+            let through = self.let_through(hit.primitive, hit.position, cosine);
+            if through.is_black() {
+                return (Some(here), share);
+            }
+            share = share * through;
+            gone = here.distance;
+            ray = self.onward(&hit, ray.direction);
+        }
+        (None, Colour::BLACK)
+    }
+
+    /// The ray that goes on along `direction` behind the surface that it met at `hit`.
+    pub fn onward(&self, hit: &Hit, direction: DVec3) -> Ray {
+        Ray { origin: self.geometry.lift(hit.position, -hit.normal), direction }
+    }
+
+    /// Draws how light along `direction` goes on at `hit`, where it is met; inside glass it has become less on its way there.
+    pub fn scatter(&self, hit: &Hit, direction: DVec3, rng: &mut Generator) -> Option<Scattered> {
+        let reflectance = &self.surface(hit.primitive).reflectance;
+        let scattered = reflectance.sample_from(hit.front, hit.normal, direction, rng)?;
+        match reflectance {
+            Reflectance::Delta(Delta::Glass(glass)) if !hit.front => {
+                Some(Scattered { factor: scattered.factor * glass.left(hit.distance), ..scattered })
+            }
+            _ => Some(scattered),
+        }
+    }
+
+    /// The same for an eye ray: what luminance is found beyond counts with the square of the index less or more.
+    pub fn scatter_eye_ray(&self, hit: &Hit, direction: DVec3, rng: &mut Generator) -> Option<Scattered> {
+        let scattered = self.scatter(hit, direction, rng)?;
+        match &self.surface(hit.primitive).reflectance {
+            Reflectance::Delta(Delta::Glass(glass)) if scattered.transmitted => {
+                Some(Scattered { factor: scattered.factor * glass.luminance_factor(hit.front), ..scattered })
+            }
+            _ => Some(scattered),
+        }
+    }
+
+    /// The ray of light that was scattered at `hit`.
+    pub fn leaving(&self, hit: &Hit, scattered: &Scattered) -> Ray {
+        let side = if scattered.transmitted { -hit.normal } else { hit.normal };
+        Ray { origin: self.geometry.lift(hit.position, side), direction: scattered.direction }
+    }
+
+    /// Chooses whether light along `direction` goes on behind `hit` or is met there; without a choice no number is drawn. With `mirrors`
+    /// what a pane mirrors is wanted; without it is not followed, and all that gets through goes on.
+    pub fn meet(&self, hit: &Hit, direction: DVec3, mirrors: bool, rng: &mut Generator) -> Meeting {
+        let surface = self.surface(hit.primitive);
+        if !surface.is_veil() {
+            return Meeting::Met(Colour::WHITE);
+        }
+        let cosine = -direction.dot(hit.normal);
+        let through = self.let_through(hit.primitive, hit.position, cosine);
+        let rest = Colour::WHITE + through * -1.0;
+        // What is met counts as much as it reflects; where connections start from it, all of it.
+        let kept = match (surface.reflectance.is_black(), mirrors) {
+            (false, _) => rest.luminance(),
+            (true, true) => (rest * surface.reflectance.albedo(cosine)).luminance(),
+            (true, false) => 0.0,
+        };
+        let passed = through.luminance();
+        if passed == 0.0 {
+            return Meeting::Met(rest);
+        }
+        let probability = passed / (passed + kept);
+        if kept == 0.0 || rng.chance(probability) {
+            Meeting::Through(through / if kept == 0.0 { 1.0 } else { probability })
+        } else {
+            Meeting::Met(rest / (1.0 - probability))
+        }
+    }
+
+    /// From `hit` straight on along `direction` to where it is met: by chance where a surface reflects what it does not let
+    /// through, `mirrors` as in [`Scene::meet`]. The share of weight that gets there.
+    pub fn met_from(&self, hit: Hit, direction: DVec3, mirrors: bool, rng: &mut Generator) -> (Option<Hit>, Colour) {
+        let (mut hit, mut share) = (hit, Colour::WHITE);
+        for _ in 0..MAX_VEILS {
+            match self.meet(&hit, direction, mirrors, rng) {
+                Meeting::Met(met) => return (Some(hit), share * met),
+                Meeting::Through(through) => share = share * through,
+            }
+            match self.geometry.closest_hit(&self.onward(&hit, direction)) {
+                Some(next) => hit = next,
+                None => return (None, share),
+            }
+        }
+        (None, Colour::BLACK)
+    }
+}
