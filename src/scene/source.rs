@@ -6,6 +6,7 @@
 use super::body::Body;
 use super::light::Light;
 use super::panel::Panel;
+use super::textures::{Glow, Place};
 use crate::geometry::Geometry;
 use crate::math::{DVec3, PI, to_world};
 use crate::photometry::Colour;
@@ -22,10 +23,12 @@ pub struct Emitter {
     pub normal: DVec3,
     /// Area \[m2\].
     pub area: f64,
-    /// Emitted luminance \[cd/m2\].
+    /// Emitted luminance \[cd/m2\]; where it varies about its mean, by which the emitter is chosen.
     pub luminance: Colour,
     /// True when the back emits as well.
     pub double_sided: bool,
+    /// How it varies.
+    glow: Option<Box<Glow>>,
 }
 
 impl Emitter {
@@ -34,11 +37,30 @@ impl Emitter {
         let [a, b, c] = geometry.triangle(primitive);
         let across = (b - a).cross(c - a);
         let (normal, area) = (across.normalize_or_zero(), 0.5 * across.length());
-        Emitter { primitive, corners: [a, b, c], normal, area, luminance, double_sided }
+        Emitter { primitive, corners: [a, b, c], normal, area, luminance, double_sided, glow: None }
     }
 
+    /// The same, one of `count`, with a luminance that varies.
+    pub(super) fn glowing(self, glow: Glow, count: usize) -> Self {
+        Emitter { luminance: glow.mean(count), glow: Some(Box::new(glow)), ..self }
+    }
+
+    /// Luminance emitted at `position` \[cd/m2\].
+    pub fn luminance_at(&self, position: DVec3) -> Colour {
+        match &self.glow {
+            None => self.luminance,
+            Some(glow) => glow.at(Place::new(self.primitive, self.corners, position).weights),
+        }
+    }
+
+    /// Flux by which it is chosen \[lm\].
     fn flux(&self) -> Colour {
-        self.luminance * (PI * self.area * if self.double_sided { 2.0 } else { 1.0 })
+        self.flux_of(self.luminance)
+    }
+
+    /// Flux with `luminance` all over \[lm\].
+    fn flux_of(&self, luminance: Colour) -> Colour {
+        luminance * (PI * self.area * if self.double_sided { 2.0 } else { 1.0 })
     }
 
     /// Square of the length of its longest edge \[m2\].
@@ -211,12 +233,22 @@ impl Sources {
                 let light = &self.lights[number];
                 (light.start(self.covered, rng.uniform2()), light.flux(self.covered.1))
             }
-            1 => (emit_triangle(&self.emitters[number], geometry, rng), self.emitters[number].flux()),
+            1 => return self.emit_triangle(&self.emitters[number], geometry, rng),
             2 => (self.panels[number].emit(geometry, rng), self.panels[number].luminaire.flux()),
             _ => (self.bodies[number].emit(geometry, rng), self.bodies[number].flux()),
         };
         // flux over the probability of the choice: the colour of the source, the luminous flux of all.
         Emission { origin, direction, weight: flux * (self.flux() / flux.luminance()) }
+    }
+
+    /// Starts a history at a point of `emitter`, uniform in area, with the luminance of that point.
+    fn emit_triangle(&self, emitter: &Emitter, geometry: &Geometry, rng: &mut Generator) -> Emission {
+        let point = emitter.point(rng.uniform2());
+        let back = emitter.double_sided && rng.uniform() < 0.5;
+        let normal = if back { -emitter.normal } else { emitter.normal };
+        let direction = to_world(normal, cosine_hemisphere(rng.uniform2()));
+        let weight = emitter.flux_of(emitter.luminance_at(point)) * (self.flux() / emitter.flux().luminance());
+        Emission { origin: geometry.lift(point, normal), direction, weight }
     }
 }
 
@@ -235,12 +267,4 @@ fn last(sums: &[f64]) -> f64 {
 /// Index of the source in whose share of the running sum `target` lies.
 fn choose(sums: &[f64], target: f64) -> usize {
     sums.partition_point(|&sum| sum <= target).min(sums.len() - 1)
-}
-
-fn emit_triangle(emitter: &Emitter, geometry: &Geometry, rng: &mut Generator) -> (DVec3, DVec3) {
-    let point = emitter.point(rng.uniform2());
-    let back = emitter.double_sided && rng.uniform() < 0.5;
-    let normal = if back { -emitter.normal } else { emitter.normal };
-    let direction = to_world(normal, cosine_hemisphere(rng.uniform2()));
-    (geometry.lift(point, normal), direction)
 }

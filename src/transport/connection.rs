@@ -211,10 +211,10 @@ impl Tile {
         scene.geometry.hide(vertex.lifted, &self.lifted, &mut seen, scratch);
         // No continuation finds what came from a delta scatterer: all of it is connected.
         let bound = if vertex.after_delta { f32::INFINITY } else { bound };
-        self.spread::<I, C>(scene, vertex, &factors, &seen, bound, &mut sums.light);
+        self.spread::<I, C>(vertex, &factors, &seen, bound, &mut sums.light);
         if vertex.after_delta {
             sums.has_mirrored = true;
-            self.spread::<I, C>(scene, vertex, &factors, &seen, bound, &mut sums.mirrored);
+            self.spread::<I, C>(vertex, &factors, &seen, bound, &mut sums.mirrored);
         }
     }
 
@@ -240,7 +240,6 @@ impl Tile {
     #[inline(always)]
     fn spread<I: Isa, const C: usize>(
         &self,
-        scene: &Scene,
         vertex: &Connector,
         factors: &Column,
         seen: &Lanes,
@@ -248,7 +247,7 @@ impl Tile {
         sums: &mut [Column; C],
     ) {
         if vertex.glossy.is_some() || self.varying.is_some() {
-            return self.spread_varying::<I, C>(scene, vertex, factors, seen, bound, sums);
+            return self.spread_varying::<I, C>(vertex, factors, seen, bound, sums);
         }
         let most = I::Sixteen::splat(bound);
         for bundle in 0..self.bundles().min(BUNDLES) {
@@ -264,7 +263,6 @@ impl Tile {
     #[inline(always)]
     fn spread_varying<I: Isa, const C: usize>(
         &self,
-        scene: &Scene,
         vertex: &Connector,
         factors: &Column,
         seen: &Lanes,
@@ -280,11 +278,11 @@ impl Tile {
             let w = sub(&lanes::<I>(&self.position, bundle), &p);
             let length = dot(&w, &w).max(I::Sixteen::splat(NOWHERE)).sqrt();
             let w = scale(&w, I::Sixteen::splat(1.0).div(length));
-            let (mut value, mut peak) = sent::<I, C>(scene, vertex, &n, &w);
+            let (mut value, mut peak) = sent::<I, C>(vertex, &n, &w);
             if let Some(varying) = &self.varying {
                 let from = scale(&w, I::Sixteen::splat(-1.0));
                 let normal = lanes::<I>(&self.normal, bundle);
-                let (response, of_receiver) = varying.respond::<I, C>(scene, bundle, here, &normal, &from);
+                let (response, of_receiver) = varying.respond::<I, C>(bundle, here, &normal, &from);
                 for c in 0..C {
                     value[c] = value[c].mul(response[c]);
                 }
@@ -302,7 +300,6 @@ impl Tile {
 /// W f of `vertex` with the normal `n` along the unit vectors `w` \[lm/sr\], and the peak of f.
 #[inline(always)]
 fn sent<I: Isa, const C: usize>(
-    scene: &Scene,
     vertex: &Connector,
     n: &Triple<I::Sixteen>,
     w: &Triple<I::Sixteen>,
@@ -313,14 +310,12 @@ fn sent<I: Isa, const C: usize>(
         sent[c] = I::Sixteen::splat(vertex.intensity[c]);
     }
     let Some(glossy) = &vertex.glossy else { return (sent, one) };
-    let reflectance = &scene.surface(glossy.primitive).reflectance;
-    let Some(law) = reflectance.lanes() else { return (sent, one) };
     let mut through = [one; C];
     for c in 0..C {
         through[c] = I::Sixteen::splat(glossy.through[c]);
     }
-    let f = law.evaluate::<I::Sixteen, C>(n, (&splat(glossy.from), &through), w);
-    let peak = if reflectance.is_peaked() { weights_over_tolerated(&f) } else { one };
+    let f = glossy.law.evaluate::<I::Sixteen, C>(n, (&splat(glossy.from), &through), w);
+    let peak = if glossy.is_peaked { weights_over_tolerated(&f) } else { one };
     for c in 0..C {
         sent[c] = f[c].mul(I::Sixteen::splat(glossy.weight[c]));
     }

@@ -3,11 +3,11 @@
 use super::trajectory::Vertex;
 use crate::math::{DVec3, PI, Vec3};
 use crate::photometry::Colour;
-use crate::scene::Scene;
+use crate::scene::{LawInLanes, Scene};
 use std::ops::Range;
 
 /// A vertex as the kernel wants it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Connector {
     pub(super) position: Vec3,
     pub(super) lifted: Vec3,
@@ -25,10 +25,12 @@ pub(super) struct Connector {
 }
 
 /// What a vertex of a law that depends on direction has besides.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct GlossyConnector {
-    /// The primitive that has the law.
-    pub(super) primitive: u32,
+    /// The law.
+    pub(super) law: LawInLanes,
+    /// Whether connections from it are spiky.
+    pub(super) is_peaked: bool,
     /// Unit vector to where the light came from.
     pub(super) from: Vec3,
     /// What gets through the specular part from there.
@@ -100,18 +102,18 @@ impl Connectors {
 }
 
 fn connector(scene: &Scene, v: &Vertex) -> Connector {
-    let reflectance = &scene.surface(v.primitive).reflectance;
-    let lambert = reflectance.lambert();
+    let reflectance = scene.reflectance(v.primitive, v.position);
     let narrow = |c: Colour| c.0.map(|c| c as f32);
     Connector {
         position: v.position.as_vec3(),
         lifted: scene.geometry.lift(v.position, v.normal).as_vec3(),
         normal: v.normal.as_vec3(),
-        intensity: narrow(v.weight * lambert.unwrap_or(Colour::BLACK) / PI),
+        intensity: narrow(v.weight * reflectance.lambert().unwrap_or(Colour::BLACK) / PI),
         order: v.order,
         after_delta: v.after_delta,
-        glossy: lambert.is_none().then(|| GlossyConnector {
-            primitive: v.primitive,
+        glossy: reflectance.lanes().map(|law| GlossyConnector {
+            law: law.clone(),
+            is_peaked: reflectance.is_peaked(),
             from: -v.w_in.as_vec3(),
             through: narrow(reflectance.through(-v.w_in.dot(v.normal))),
             weight: narrow(v.weight),

@@ -96,7 +96,7 @@ impl Found {
     /// The receiver of light that is reflected here and then counts with `weight`.
     fn receiver(self, scene: &Scene, weight: Colour) -> Receiver {
         let Found { hit, back, carried } = self;
-        let response = Response::reflectance(scene, (hit.primitive, hit.normal), back, weight, carried);
+        let response = Response::reflectance(scene, (hit.primitive, hit.position, hit.normal), back, weight, carried);
         Receiver { position: hit.position, normal: hit.normal, response }
     }
 }
@@ -115,7 +115,7 @@ fn step(scene: &Scene, at: &Receiver, bound: f64, rng: &mut Generator) -> Option
         1.0 / bound.sqrt() * (1.0 + 1e-6) + 2.0 * origin.distance(at.position)
     };
     let hit = scene.geometry.closest_hit_within(&Ray { origin, direction }, reach).filter(|h| !scene.absorbs(h))?;
-    let reflectance = &scene.surface(hit.primitive).reflectance;
+    let reflectance = scene.reflectance(hit.primitive, hit.position);
     if reflectance.is_black() {
         return None;
     }

@@ -50,16 +50,16 @@ pub fn path(scene: &Scene, transport: &Transport, receiver: &Receiver, rng: &mut
     let first = weight.luminance();
     for met in 1..=MAX_VERTICES {
         let Some(hit) = scene.geometry.closest_hit(&ray).filter(|h| !scene.absorbs(h)) else { break };
-        let surface = scene.surface(hit.primitive);
+        let reflectance = scene.reflectance(hit.primitive, hit.position);
         let back = -ray.direction;
-        let response = |w_in| surface.reflectance.evaluate(hit.normal, w_in, back);
+        let response = |w_in| reflectance.evaluate(hit.normal, w_in, back);
         *(if met == 1 { &mut found.direct } else { &mut found.reflected }) += weight * scene.emitted(&hit, back);
         found.reflected += weight * from_lights(scene, hit.position, hit.normal, response);
-        if surface.reflectance.is_peaked_at(back.dot(hit.normal)) {
-            let matt = |w_in: DVec3| surface.reflectance.albedo(-w_in.dot(hit.normal)) / PI;
+        if reflectance.is_peaked_at(back.dot(hit.normal)) {
+            let matt = |w_in: DVec3| reflectance.albedo(-w_in.dot(hit.normal)) / PI;
             found.caustic += weight * from_lights(scene, hit.position, hit.normal, matt);
         }
-        let Some(next) = surface.reflectance.sample(hit.normal, ray.direction, rng) else { break };
+        let Some(next) = reflectance.sample(hit.normal, ray.direction, rng) else { break };
         // No connection carries what a mirror sends straight to the receiver.
         if met == 1 && next.delta {
             break;
@@ -75,8 +75,8 @@ pub fn path(scene: &Scene, transport: &Transport, receiver: &Receiver, rng: &mut
 pub fn lights_at(scene: &Scene, receiver: &Receiver) -> Colour {
     from_lights(scene, receiver.position, receiver.normal, |w_in| match receiver.response {
         Response::Cosine => Colour::WHITE,
-        Response::Reflectance { primitive, to_eye, attenuation, .. } => {
-            scene.surface(primitive).reflectance.evaluate(receiver.normal, w_in, to_eye) * attenuation
+        Response::Reflectance { primitive, position, to_eye, attenuation, .. } => {
+            scene.reflectance(primitive, position).evaluate(receiver.normal, w_in, to_eye) * attenuation
         }
     })
 }
@@ -86,8 +86,8 @@ fn leave(scene: &Scene, receiver: &Receiver, rng: &mut Generator) -> Option<(Ray
     let normal = receiver.normal;
     let (direction, weight) = match receiver.response {
         Response::Cosine => (to_world(normal, cosine_hemisphere(rng.uniform2())), Colour::grey(PI)),
-        Response::Reflectance { primitive, to_eye, attenuation, .. } => {
-            let drawn = scene.surface(primitive).reflectance.sample(normal, -to_eye, rng)?;
+        Response::Reflectance { primitive, position, to_eye, attenuation, .. } => {
+            let drawn = scene.reflectance(primitive, position).sample(normal, -to_eye, rng)?;
             (!drawn.delta).then_some((drawn.direction, attenuation * drawn.factor))?
         }
     };

@@ -48,7 +48,7 @@ fn lit_point(scene: &Scene, set: &PointSet, i: u32, count: u32) -> impl Iterator
     let (number, probability) = scene.sources.choose_number(choice);
     let emitter = &scene.sources.emitters[number];
     let position = emitter.point(DVec2::new(x, y));
-    let intensity = emitter.luminance * (emitter.area / (probability * f64::from(count)));
+    let intensity = emitter.luminance_at(position) * (emitter.area / (probability * f64::from(count)));
     let lit = move |normal: DVec3| LitPoint { position, normal, intensity, emitter: number as u32 };
     let sides = if emitter.double_sided { 2 } else { 1 };
     [emitter.normal, -emitter.normal].into_iter().take(sides).map(lit)

@@ -8,6 +8,7 @@ mod damage;
 mod geometry;
 mod lights_and_cameras;
 mod materials;
+mod textures;
 
 use gltf_builder::Builder;
 use lampyris::error::{Error, Result};
