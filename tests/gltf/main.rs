@@ -5,6 +5,7 @@ mod gltf_builder;
 
 mod bad;
 mod damage;
+mod foreign;
 mod geometry;
 mod lights_and_cameras;
 mod materials;

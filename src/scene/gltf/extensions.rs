@@ -50,6 +50,8 @@ fn effect(name: &str) -> Option<&'static str> {
     Some(match name {
         // Metadata carries no light.
         "KHR_xmp" | "KHR_xmp_json_ld" => return None,
+        // How the triangles of a polygon belong together.
+        "FB_ngon_encoding" => return None,
         "KHR_materials_unlit" => "its materials reflect by their metallic-roughness factors",
         "KHR_materials_transmission" | "KHR_materials_diffuse_transmission" => "its materials are opaque",
         "KHR_materials_volume" | "KHR_materials_dispersion" => "its materials are opaque",

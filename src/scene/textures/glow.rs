@@ -80,7 +80,7 @@ impl Glow {
 fn centre(i: usize, j: usize, n: usize) -> [f64; 3] {
     let third = 1.0 / (3 * n) as f64;
     // Row i lies between the shares i/n and (i + 1)/n from the first corner; even triangles point to it, odd ones away.
-    let (far, along) = if j % 2 == 0 { (3 * i + 2, 3 * (j / 2) + 1) } else { (3 * i + 1, 3 * (j / 2) + 2) };
+    let (far, along) = if j.is_multiple_of(2) { (3 * i + 2, 3 * (j / 2) + 1) } else { (3 * i + 1, 3 * (j / 2) + 2) };
     let (far, along) = (far as f64 * third, along as f64 * third);
     [1.0 - far, far - along, along]
 }
