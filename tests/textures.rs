@@ -7,7 +7,9 @@ use common::scenes::{add_quad, closed_box, lambert, point, spot_camera};
 use common::{Case, assert_all, compare, difference, flux};
 use lampyris::math::{DVec2, DVec3, PI};
 use lampyris::photometry::Colour;
-use lampyris::scene::textures::{Charts, Coding, Filter, Image, Layer, Texels, Textured, Textures, Transform, Wrap};
+use lampyris::scene::textures::{
+    Charts, Coding, Coverage, Filter, Image, Layer, Texels, Textured, Textures, Transform, Wrap,
+};
 use lampyris::scene::{Dielectric, Light, Model, Reflectance, Surface};
 use lampyris::validate::closed_forms::polygon;
 use std::sync::Arc;
@@ -31,6 +33,8 @@ fn plain(base: f64) -> Textured {
         dielectric: Dielectric::PLAIN,
         emission: Colour::BLACK,
         emission_layer: None,
+        coverage: Coverage::Whole,
+        alpha: 1.0,
     }
 }
 
@@ -205,4 +209,70 @@ fn local_and_reverse_agree_where_everything_varies() {
         .map(|(name, (a, b))| difference(name, a, b))
         .collect();
     assert_all(&all);
+}
+
+/// White texels with an alpha of 255 or less where the chequers are dark.
+fn holes(alpha: u8) -> Layer {
+    let texels = chequers().iter().map(|t| [255, 255, 255, if t[0] > 100 { 255 } else { alpha }]).collect();
+    let image = Arc::new(Image::new(8, Texels::Eight(texels)).expect("whole rows"));
+    Layer { image, ..layer(1, &[[0; 3]], Filter::Nearest, Coding::Srgb) }
+}
+
+/// A two-sided screen of reflectance 0.6 with holes, of 2 x 1 m in the plane y = 1/2.
+fn screen(mut model: Model, coverage: Coverage, alpha: u8) -> Model {
+    let quad = model.surfaces.len();
+    let both = Surface { double_sided: true, ..lambert(0.5, 0.0) };
+    add_quad(&mut model, DVec3::new(0.0, 0.5, 0.0), DVec3::X * 2.0, DVec3::Z, both);
+    varied(model, vec![(quad, Textured { base_layer: Some(holes(alpha)), coverage, ..plain(0.6) })])
+}
+
+#[test]
+fn light_falls_through_the_holes_of_a_mask_and_a_share_of_it_through_a_veil() {
+    // Column 0 of row 0 is bright, and so opaque; column 1 is a hole.
+    let (opaque, hole) = ([0.12, 0.1, 0.13], [0.37, 0.1, 0.13]);
+    let eye = |at: [f64; 3]| [at[0], 2.0, at[2] + 1e-3];
+    let on = |at: [f64; 3]| [at[0], 0.5, at[2]];
+    let job = "[run]\nhistories_per_batch = 256\nbatches = 16\nseed = 5\n".to_owned()
+        + &spot_camera("sunny", eye(opaque), on(opaque), [1.0, 0.0, 0.0])
+        + &point("shadow", opaque, [0.0, 1.0, 0.0])
+        + &point("hole", hole, [0.0, 1.0, 0.0]);
+    for (coverage, alpha, through) in
+        [(Coverage::Mask(0.5), 0, 1.0), (Coverage::Blend, 51, 0.8), (Coverage::Mask(0.1), 51, 0.0)]
+    {
+        let mut model = screen(Model::default(), coverage, alpha);
+        model.lights.push(Light::Directional { direction: DVec3::NEG_Y, illuminance: Colour::grey(100.0) });
+        let values = Case::new(&job, model).values();
+        let names = ["sunny", "shadow", "hole"];
+        for ((name, value), exact) in names.iter().zip(&values).zip([60.0 / PI, 0.0, 100.0 * through]) {
+            assert!((value.mean - exact).abs() < 1e-4, "{name} with {coverage:?}: {} against {exact}", value.mean);
+        }
+    }
+}
+
+#[test]
+fn local_and_reverse_agree_around_screens_and_no_light_is_lost() {
+    for (coverage, alpha) in [(Coverage::Mask(0.5), 0), (Coverage::Blend, 80)] {
+        let mut room = closed_box(DVec3::new(2.0, 1.0, 1.0), &lambert(0.6, 0.0));
+        // The wall at x = 0 lights both sides.
+        room.surfaces[0] = lambert(0.5, 60.0);
+        let room = screen(room, coverage, alpha);
+        let receivers = point("below", [0.6, 0.2, 0.4], [-1.0, 0.3, 0.1])
+            + &point("beside", [0.9, 0.7, 0.6], [-1.0, -0.3, 0.0])
+            + &spot_camera("upper", [0.8, 0.9, 0.5], [0.12, 0.5, 0.13], [1.0, 0.0, 0.0]);
+        let case = |estimator: &str, histories: u32| {
+            let run = format!(
+                "[run]\nhistories_per_batch = {histories}\nbatches = 64\nseed = 64\n[transport]\nestimator = \"{estimator}\"\n"
+            );
+            Case::new(&(run + &receivers), room.clone())
+        };
+        let (local, reverse) = (case("local", 2048), case("reverse", 8192));
+        let names = local.job.sets().into_iter().map(|s| s.name);
+        let mut all: Vec<_> = names
+            .zip(local.values().into_iter().zip(reverse.values()))
+            .map(|(name, (a, b))| difference(format!("{coverage:?} {name}"), a, b))
+            .collect();
+        let (_, batches) = local.batches(0..u32::MAX);
+        all.push(compare(format!("{coverage:?} absorbed"), flux(&batches, "absorbed"), PI * 60.0));
+        assert_all(&all);
+    }
 }

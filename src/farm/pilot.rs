@@ -65,6 +65,9 @@ fn bound_of_closed(scene: &Scene) -> f64 {
     let (mut area, mut reflecting) = (0.0, 0.0);
     for primitive in 0..scene.primitives() {
         let surface = scene.surface(primitive);
+        if surface.is_veil() {
+            continue;
+        }
         let sides = if surface.double_sided { 2.0 } else { 1.0 };
         let side = sides * scene.geometry.area(primitive);
         area += side;
@@ -110,11 +113,11 @@ fn indirect(scene: &Scene, vertices: &[Vertex], receiver: &Receiver) -> f64 {
         let way: DVec3 = receiver.position - v.position;
         let d2 = way.length_squared().max(f64::MIN_POSITIVE);
         let factor = way.dot(v.normal).max(0.0) * (-way.dot(receiver.normal)).max(0.0) / (d2 * d2);
-        let seen = factor > 0.0 && {
-            let from = scene.geometry.lift(v.position, v.normal).as_vec3();
-            scene.geometry.visible(from, lifted)
-        };
-        if seen { reflected(scene, v).luminance() / PI * factor } else { 0.0 }
+        if factor <= 0.0 {
+            return 0.0;
+        }
+        let from = scene.geometry.lift(v.position, v.normal).as_vec3();
+        (reflected(scene, v) * scene.transmittance(from, lifted)).luminance() / PI * factor
     };
     vertices.iter().map(of_vertex).sum::<f64>() / TRAJECTORIES as f64
 }

@@ -75,10 +75,8 @@ impl Mesh {
 
     /// The same for rays and segments that come from anywhere in the box between two corners.
     pub(super) fn within(triangles: &[[Vec3; 3]], build: Build, around: (DVec3, DVec3)) -> Self {
-        let bounds = triangles.iter().flatten().fold(around, |(low, high), p| {
-            let p = p.as_dvec3();
-            (low.min(p), high.max(p))
-        });
+        let own = Mesh::bounds_of(triangles);
+        let bounds = (around.0.min(own.0), around.1.max(own.1));
         let diagonal = (bounds.1 - bounds.0).length();
         let size = bounds.0.abs().max(bounds.1.abs()).max_element() + diagonal;
         // Twice the scene is the longest way of a ray inside it; 8 roundings of that are more than a test of a box makes.
@@ -100,6 +98,28 @@ impl Mesh {
         let floor = (size / (1u64 << 46) as f64) as f32;
         let path = Path::chosen().unwrap_or(Path::Scalar);
         Mesh { triangles: ordered, place, bvh, blocks, leaves, bounds, near, floor, path }
+    }
+
+    /// Corners of the box around `triangles` \[m\].
+    pub(super) fn bounds_of(triangles: &[[Vec3; 3]]) -> (DVec3, DVec3) {
+        let empty = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        triangles.iter().flatten().fold(empty, |(low, high), p| (low.min(p.as_dvec3()), high.max(p.as_dvec3())))
+    }
+
+    /// The same triangles under other numbers, in ascending order: that of triangle i is `numbers[i]`.
+    pub(super) fn numbered(mut self, numbers: &[u32]) -> Self {
+        self.place = vec![u32::MAX; numbers.last().map_or(0, |&last| last as usize + 1)];
+        for (place, (triangle, primitive)) in (0..).zip(self.triangles.iter_mut().zip(&mut self.bvh.order)) {
+            *primitive = numbers[*primitive as usize];
+            triangle.primitive = *primitive;
+            self.place[*primitive as usize] = place;
+        }
+        self
+    }
+
+    /// True when `primitive` is one of its triangles.
+    pub(super) fn has(&self, primitive: u32) -> bool {
+        self.place.get(primitive as usize).is_some_and(|&place| place != u32::MAX)
     }
 
     /// Number of triangles.
@@ -134,7 +154,7 @@ impl Mesh {
     /// Parameters at which the line o + t d, t in 0 ..= `end`, enters and leaves the mesh; `None` when it misses it.
     ///
     /// Beyond the mesh f32 rounds more than the boxes of the hierarchy are inflated by, so no ray starts there.
-    fn clip(&self, o: DVec3, d: DVec3, end: f64) -> Option<(f64, f64)> {
+    pub(super) fn clip(&self, o: DVec3, d: DVec3, end: f64) -> Option<(f64, f64)> {
         let (low, high) = self.near;
         let (mut enter, mut leave) = (0.0f64, end);
         for axis in 0..3 {

@@ -26,6 +26,7 @@ mod ray;
 mod shaft;
 pub mod simd;
 mod sphere;
+mod veils;
 pub mod visibility;
 
 pub use bvh::Build;
@@ -34,6 +35,7 @@ pub use mesh::Mesh;
 pub use ordering::kd_order;
 pub use plane::Plane;
 pub use sphere::Sphere;
+pub use veils::Crossing;
 
 use crate::math::{DVec3, Vec3};
 use simd::Path;
@@ -69,6 +71,8 @@ pub struct Hit {
 #[derive(Default)]
 pub struct Geometry {
     mesh: Mesh,
+    /// Triangles that do not block, where there are any.
+    veils: Option<Mesh>,
     spheres: Vec<Sphere>,
     planes: Vec<Plane>,
     harmonics: Vec<Harmonic>,
@@ -80,6 +84,11 @@ impl Geometry {
     /// Joins triangles, spheres and planes; coordinates are re-centred already.
     pub fn new(mesh: Mesh, spheres: Vec<Sphere>, planes: Vec<Plane>) -> Self {
         Geometry { mesh, spheres, planes, ..Geometry::default() }.measured()
+    }
+
+    /// The same geometry with spheres and planes, re-centred too.
+    pub fn with_quadrics(self, spheres: Vec<Sphere>, planes: Vec<Plane>) -> Self {
+        Geometry { spheres, planes, ..self }.measured()
     }
 
     /// The same geometry and star-shaped objects, re-centred too.
@@ -103,22 +112,27 @@ impl Geometry {
     /// Corners of the box around all bounded geometry \[m\].
     fn bounds(&self) -> (DVec3, DVec3) {
         let spheres = self.spheres.iter().map(|s| (s.center - s.radius, s.center + s.radius));
-        spheres.chain(self.harmonics.iter().map(Harmonic::bounds)).fold(self.mesh.bounds(), union)
+        let veils = self.veils.iter().map(Mesh::bounds);
+        spheres.chain(self.harmonics.iter().map(Harmonic::bounds)).chain(veils).fold(self.mesh.bounds(), union)
     }
 
     /// Number of triangles.
     pub fn triangles(&self) -> u64 {
-        self.mesh.len() as u64
+        (self.mesh.len() + self.veils.as_ref().map_or(0, Mesh::len)) as u64
     }
 
     /// Memory of triangles, acceleration structure and what star-shaped objects add to their series \[bytes\].
     pub fn bytes(&self) -> u64 {
-        self.mesh.bytes() + self.harmonics.iter().map(Harmonic::bytes).sum::<u64>()
+        let veils = self.veils.as_ref().map_or(0, Mesh::bytes);
+        self.mesh.bytes() + veils + self.harmonics.iter().map(Harmonic::bytes).sum::<u64>()
     }
 
     /// Corners of the triangle `primitive` \[m\], as the rays see it.
     pub fn triangle(&self, primitive: u32) -> [DVec3; 3] {
-        self.mesh.triangle(primitive)
+        match &self.veils {
+            Some(veils) if veils.has(primitive) => veils.triangle(primitive),
+            _ => self.mesh.triangle(primitive),
+        }
     }
 
     /// The star-shaped objects.
@@ -137,18 +151,31 @@ impl Geometry {
         if low.x > high.x { (DVec3::ZERO, 0.0) } else { (0.5 * (low + high), 0.5 * (high - low).length()) }
     }
 
-    /// The first surface along `ray`; equal distances go to the lower primitive number.
+    /// The first surface along `ray`, a veil included; equal distances go to the lower primitive number, and to what blocks.
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
         self.closest_hit_within(ray, f64::INFINITY)
     }
 
     /// The same where it is at most `limit` away \[m\], else `None`: the shorter, the faster.
     pub fn closest_hit_within(&self, ray: &Ray, limit: f64) -> Option<Hit> {
+        let hit = self.closest_block(ray, limit);
+        if self.veils.is_some() { self.or_veil(ray, hit, limit) } else { hit }
+    }
+
+    /// The same of what blocks.
+    fn closest_block(&self, ray: &Ray, limit: f64) -> Option<Hit> {
         let hit = self.mesh.closest_hit(ray, limit);
         if !self.has_others() {
             return hit;
         }
         self.closest_of_all(ray, hit).filter(|hit| hit.distance <= limit)
+    }
+
+    /// A veil along `ray` before `hit`, else `hit`.
+    fn or_veil(&self, ray: &Ray, hit: Option<Hit>, limit: f64) -> Option<Hit> {
+        let end = hit.map_or(limit, |hit| hit.distance);
+        let veil = self.veils.as_ref().and_then(|veils| veils.closest_hit(ray, end));
+        veil.filter(|veil| hit.is_none() || veil.distance < end).or(hit)
     }
 
     /// What [`Geometry::closest_hit`] gives for each of `rays`, to `hits`, of the same length. Rays from one point go
@@ -157,8 +184,13 @@ impl Geometry {
         assert_eq!(rays.len(), hits.len(), "a hit for each ray");
         self.mesh.closest_hits(rays, hits);
         if self.has_others() {
-            for (ray, hit) in rays.iter().zip(hits) {
+            for (ray, hit) in rays.iter().zip(&mut *hits) {
                 *hit = self.closest_of_all(ray, *hit);
+            }
+        }
+        if self.veils.is_some() {
+            for (ray, hit) in rays.iter().zip(hits) {
+                *hit = self.or_veil(ray, *hit, f64::INFINITY);
             }
         }
     }
@@ -170,7 +202,7 @@ impl Geometry {
 
     /// The first surface along `ray`, which meets the triangles at `best`.
     fn closest_of_all(&self, ray: &Ray, mut best: Option<Hit>) -> Option<Hit> {
-        let mut number = self.mesh.len() as u32;
+        let mut number = self.triangles() as u32;
         let mut offer = |find: &dyn Fn(f64) -> Option<Hit>| {
             let limit = best.map_or(f64::INFINITY, |b| b.distance);
             if let Some(hit) = find(limit).filter(|hit| hit.distance < limit) {
@@ -194,7 +226,7 @@ impl Geometry {
         position + normal * (LIFT * self.extent.max(position.abs().max_element()))
     }
 
-    /// True when no surface crosses the segment between two lifted points.
+    /// True when no surface but veils crosses the segment between two lifted points.
     pub fn visible(&self, a: Vec3, b: Vec3) -> bool {
         self.planes.iter().all(|p| !p.blocks(a, b))
             && self.spheres.iter().all(|s| !s.blocks(a, b))
@@ -205,6 +237,7 @@ impl Geometry {
     /// The same geometry with its kernels on `path`, which the processor must have: for tests.
     pub fn with_path(mut self, path: Path) -> Self {
         self.mesh.path = path;
+        self.veils.iter_mut().for_each(|v| v.path = path);
         self.harmonics.iter_mut().for_each(|h| h.set_path(path));
         self
     }
@@ -218,7 +251,7 @@ impl Geometry {
     /// the point lies inside a solid.
     pub fn is_inside(&self, point: DVec3, absorbs: impl Fn(&Hit) -> bool) -> bool {
         probe_directions().all(|direction| {
-            let hit = self.closest_hit(&Ray { origin: point, direction });
+            let hit = self.closest_block(&Ray { origin: point, direction }, f64::INFINITY);
             hit.is_some_and(|h| !h.front && absorbs(&h))
         })
     }

@@ -24,6 +24,7 @@ impl Geometry {
             || self.spheres.iter().any(|s| s.may_exceed(position, normal, bound))
             || self.harmonics.iter().any(|h| h.may_exceed(position, normal, bound))
             || self.mesh.may_exceed(position, normal, bound, floor)
+            || self.veils.as_ref().is_some_and(|v| v.may_exceed(position, normal, bound, floor))
     }
 
     /// Distance of the nearest triangle from `point`, or `limit` where none is nearer \[m\].
@@ -33,12 +34,12 @@ impl Geometry {
 
     /// Area of one side of a primitive \[m2\]; infinite for a plane.
     pub fn area(&self, primitive: u32) -> f64 {
-        let primitive = primitive as usize;
-        if primitive < self.mesh.len() {
+        let (primitive, triangles) = (primitive as usize, self.triangles() as usize);
+        if primitive < triangles {
             let [a, b, c] = self.triangle(primitive as u32);
             return 0.5 * (b - a).cross(c - a).length();
         }
-        let other = primitive - self.mesh.len();
+        let other = primitive - triangles;
         if let Some(sphere) = self.spheres.get(other) {
             return 4.0 * crate::math::PI * sphere.radius * sphere.radius;
         }

@@ -15,20 +15,23 @@ mod reflectance;
 mod replace;
 mod source;
 pub mod textures;
+mod veils;
 
 pub use body::{Body, BodyPoint, in_cone};
 pub use light::Light;
 pub use nodes::{Node, Nodes};
 pub use panel::{Extended, Panel};
 pub use reflectance::{
-    Dielectric, Finish, LawInLanes, Reflectance, Scattered, Tint, Tints, weight_over_tolerated, weights_over_tolerated,
+    Delta, Dielectric, Finish, LawInLanes, Pane, Reflectance, Scattered, Tint, Tints, weight_over_tolerated,
+    weights_over_tolerated,
 };
 pub use source::{Emission, Emitter, Sources};
+pub use veils::Meeting;
 
 use self::photometric_web::Luminaire;
 use self::textures::{Place, Textures};
 use crate::error::{Error, Result};
-use crate::geometry::{Build, Geometry, Harmonic, Hit, Mesh, Plane, Sphere};
+use crate::geometry::{Build, Geometry, Harmonic, Hit, Plane, Sphere};
 use crate::job::{self, Channels, Job};
 use crate::math::DVec3;
 use crate::photometry::Colour;
@@ -147,11 +150,16 @@ impl Scene {
             Channels::Rgb => c,
         };
         let corners = model.triangles.iter().map(|t| t.map(|v| (model.positions[v as usize] + offset).as_vec3()));
-        let mesh = Mesh::built(&corners.collect::<Vec<_>>(), build);
+        let corners: Vec<_> = corners.collect();
         let mut surfaces: Vec<Surface> = model.surfaces.into_iter().map(|s| painted(s, job.run.channels)).collect();
         let mut surface_of = model.surface_of;
+        let is_veil =
+            |(triangle, &s): (u32, &u32)| surfaces[s as usize].is_veil() || model.textures.is_veil(s, triangle);
+        let veils: Vec<bool> = (0..).zip(&surface_of).map(is_veil).collect();
         let harmonics = model.replacements.iter().map(|r| r.harmonic.clone().moved(offset)).collect();
-        let geometry = Geometry::new(mesh, spheres(job, offset), planes(job, offset)).with_harmonics(harmonics);
+        let geometry = Geometry::veiled(&corners, &veils, build)
+            .with_quadrics(spheres(job, offset), planes(job, offset))
+            .with_harmonics(harmonics);
         let shares = job.spheres.iter().map(|s| s.reflectance).chain(job.planes.iter().map(|p| p.reflectance));
         for share in shares {
             surface_of.push(surfaces.len() as u32);

@@ -38,34 +38,36 @@ struct View<'a> {
 impl View<'_> {
     fn sample(&self, receiver: &Receiver, rng: &mut Generator) -> Colour {
         let point = if rng.uniform() < 0.5 { self.by_area(rng) } else { self.by_direction(rng) };
-        let Some(point) = point else { return Colour::BLACK };
+        let Some((point, through)) = point else { return Colour::BLACK };
         let w_in = (self.from - point.position).normalize();
         let cosine = -receiver.normal.dot(w_in);
         if cosine <= 0.0 {
             return Colour::BLACK;
         }
         let both = self.density(&point, w_in) + density_of_response(self.scene, receiver, w_in);
-        self.body.luminance * (cosine / both) * receiver.response.to(self.scene, receiver.normal, w_in)
+        self.body.luminance * through * (cosine / both) * receiver.response.to(self.scene, receiver.normal, w_in)
     }
 
-    /// A point drawn from the surface, where it is seen and lit.
-    fn by_area(&self, rng: &mut Generator) -> Option<BodyPoint> {
+    /// A point drawn from the surface, where it is seen and lit, and the share of its light that veils let through.
+    fn by_area(&self, rng: &mut Generator) -> Option<(BodyPoint, Colour)> {
         let geometry = &self.scene.geometry;
         let point = self.body.point(geometry, rng.uniform2());
         let side = self.body.lit_side(&point, self.from)?;
         let target = geometry.lift(point.position, side);
-        geometry.visible(self.from.as_vec3(), target.as_vec3()).then_some(point)
+        let through = self.scene.transmittance(self.from.as_vec3(), target.as_vec3());
+        (!through.is_black()).then_some((point, through))
     }
 
-    /// The point in a direction that may show the body, where it does.
-    fn by_direction(&self, rng: &mut Generator) -> Option<BodyPoint> {
+    /// The point in a direction that may show the body, where it does, and the share of its light that veils let through.
+    fn by_direction(&self, rng: &mut Generator) -> Option<(BodyPoint, Colour)> {
         let geometry = &self.scene.geometry;
         let (axis, height) = self.body.seen_from(geometry, self.from);
         let direction = in_cone(axis, height, rng.uniform2());
-        let hit = geometry.closest_hit(&Ray { origin: self.from, direction })?;
+        let (hit, through) = self.scene.straight(&Ray { origin: self.from, direction }, f64::INFINITY);
+        let hit = hit?;
         let point = (hit.primitive == self.body.primitive).then(|| self.body.point_at(geometry, hit.position))?;
         self.body.lit_side(&point, self.from)?;
-        Some(point)
+        Some((point, through))
     }
 
     /// Density in solid angle with which `point` is drawn in either way, the choice of the body included \[1/sr\].

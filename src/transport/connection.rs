@@ -20,6 +20,7 @@ use super::connectors::Connector;
 use super::receiver::Receiver;
 use super::totals::{Column, Sums, Totals};
 use super::varying::Varying;
+use super::veils;
 use crate::geometry::simd::exact::{Triple, dot, scale, splat, sub};
 use crate::geometry::simd::{Isa, Kernel, Vector};
 use crate::geometry::visibility::{BUNDLE, BUNDLES, Lanes, Points, Scratch};
@@ -209,12 +210,16 @@ impl Tile {
             return;
         }
         scene.geometry.hide(vertex.lifted, &self.lifted, &mut seen, scratch);
+        let veiled = scene.geometry.has_veils()
+            && veils::let_through(scene, vertex.lifted, &self.lifted, &seen, &mut sums.through);
+        let through = veiled.then_some(&sums.through);
         // No continuation finds what came from a delta scatterer: all of it is connected.
         let bound = if vertex.after_delta { f32::INFINITY } else { bound };
-        self.spread::<I, C>(vertex, &factors, &seen, bound, &mut sums.light);
+        let carrying = Carrying { factors: &factors, seen: &seen, bound, through };
+        self.spread::<I, C>(vertex, &carrying, &mut sums.light);
         if vertex.after_delta {
             sums.has_mirrored = true;
-            self.spread::<I, C>(vertex, &factors, &seen, bound, &mut sums.mirrored);
+            self.spread::<I, C>(vertex, &carrying, &mut sums.mirrored);
         }
     }
 
@@ -235,26 +240,24 @@ impl Tile {
         }
     }
 
-    /// Adds to `sums` what `vertex` sends each receiver seen, over its geometric factor up to `bound` over the peaks of both
+    /// Adds to `sums` what `vertex` sends each receiver seen, over its geometric factor up to the bound over the peaks of both
     /// laws.
     #[inline(always)]
-    fn spread<I: Isa, const C: usize>(
-        &self,
-        vertex: &Connector,
-        factors: &Column,
-        seen: &Lanes,
-        bound: f32,
-        sums: &mut [Column; C],
-    ) {
+    fn spread<I: Isa, const C: usize>(&self, vertex: &Connector, carrying: &Carrying<C>, sums: &mut [Column; C]) {
         if vertex.glossy.is_some() || self.varying.is_some() {
-            return self.spread_varying::<I, C>(vertex, factors, seen, bound, sums);
+            return self.spread_varying::<I, C>(vertex, carrying, sums);
         }
+        let Carrying { factors, seen, bound, through } = *carrying;
         let most = I::Sixteen::splat(bound);
         for bundle in 0..self.bundles().min(BUNDLES) {
             let carried = I::Sixteen::load(&factors[bundle]).min(most).select(u32::from(seen[bundle]));
             for c in 0..C {
                 let sum = I::Sixteen::load(&sums[c][bundle]);
-                sum.add(carried.mul(I::Sixteen::splat(vertex.intensity[c]))).store(&mut sums[c][bundle]);
+                let mut light = carried.mul(I::Sixteen::splat(vertex.intensity[c]));
+                if let Some(through) = through {
+                    light = light.mul(I::Sixteen::load(&through[c][bundle]));
+                }
+                sum.add(light).store(&mut sums[c][bundle]);
             }
         }
     }
@@ -264,11 +267,10 @@ impl Tile {
     fn spread_varying<I: Isa, const C: usize>(
         &self,
         vertex: &Connector,
-        factors: &Column,
-        seen: &Lanes,
-        bound: f32,
+        carrying: &Carrying<C>,
         sums: &mut [Column; C],
     ) {
+        let Carrying { factors, seen, bound, through } = *carrying;
         let (p, n) = (splat(vertex.position), splat(vertex.normal));
         for bundle in 0..self.bundles().min(BUNDLES) {
             let here = u32::from(seen[bundle]);
@@ -291,10 +293,25 @@ impl Tile {
             let carried = I::Sixteen::load(&factors[bundle]).min(I::Sixteen::splat(bound).div(peak));
             for c in 0..C {
                 let sum = I::Sixteen::load(&sums[c][bundle]);
-                sum.add(value[c].mul(carried).select(here)).store(&mut sums[c][bundle]);
+                let mut light = value[c].mul(carried);
+                if let Some(through) = through {
+                    light = light.mul(I::Sixteen::load(&through[c][bundle]));
+                }
+                sum.add(light.select(here)).store(&mut sums[c][bundle]);
             }
         }
     }
+}
+
+/// What connections from one vertex to a tile carry.
+struct Carrying<'a, const C: usize> {
+    /// Geometric factors G without visibility \[1/m2\].
+    factors: &'a Column,
+    seen: &'a Lanes,
+    /// b where it applies \[1/m2\].
+    bound: f32,
+    /// What veils on the way let through, where there are any \[1\].
+    through: Option<&'a [Column; C]>,
 }
 
 /// W f of `vertex` with the normal `n` along the unit vectors `w` \[lm/sr\], and the peak of f.

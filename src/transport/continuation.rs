@@ -114,7 +114,10 @@ fn step(scene: &Scene, at: &Receiver, bound: f64, rng: &mut Generator) -> Option
         // From farther away no factor exceeds b, and the path would end there.
         1.0 / bound.sqrt() * (1.0 + 1e-6) + 2.0 * origin.distance(at.position)
     };
-    let hit = scene.geometry.closest_hit_within(&Ray { origin, direction }, reach).filter(|h| !scene.absorbs(h))?;
+    let first = scene.geometry.closest_hit_within(&Ray { origin, direction }, reach)?;
+    // What a pane mirrors is carried by connections alone, as of every mirror.
+    let (hit, share) = scene.met_from(first, direction, false, rng);
+    let (hit, weight) = (hit.filter(|h| !scene.absorbs(h))?, weight * share);
     let reflectance = scene.reflectance(hit.primitive, hit.position);
     if reflectance.is_black() {
         return None;

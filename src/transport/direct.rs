@@ -39,16 +39,26 @@ fn light_by_light(scene: &Scene, receiver: &Receiver, response: impl Fn(DVec3) -
     for light in &scene.sources.lights {
         let (from, w_in, across) = light.at(receiver.position);
         let cosine = -receiver.normal.dot(w_in);
-        let visible = || match from {
-            Some(position) => scene.geometry.visible(lifted.as_vec3(), position.as_vec3()),
-            None => scene.geometry.closest_hit(&Ray { origin: lifted, direction: -w_in }).is_none(),
-        };
         // At the lamp itself the cosine is NaN, which is not above zero: no light instead of no number.
-        if cosine > 0.0 && !across.is_black() && visible() {
-            sum += across * cosine * response(w_in);
+        if cosine > 0.0 && !across.is_black() {
+            let through = match from {
+                Some(position) => scene.transmittance(lifted.as_vec3(), position.as_vec3()),
+                None => from_afar(scene, &Ray { origin: lifted, direction: -w_in }),
+            };
+            if !through.is_black() {
+                sum += across * through * cosine * response(w_in);
+            }
         }
     }
     sum
+}
+
+/// The share of parallel light against `ray` that gets to its origin, a lifted point.
+pub(super) fn from_afar(scene: &Scene, ray: &Ray) -> Colour {
+    match scene.straight(ray, f64::INFINITY) {
+        (None, share) => share,
+        (Some(_), _) => Colour::BLACK,
+    }
 }
 
 /// Unbiased estimate of the light from area lights by `samples` samples, times the response \[lx or cd/m2\].
@@ -135,11 +145,12 @@ fn sample_emitter(scene: &Scene, receiver: &Receiver, sight: &Sight, rng: &mut G
     let w_in = (sight.from - point).normalize();
     let cosine = -receiver.normal.dot(w_in);
     let target = scene.geometry.lift(point, sight.normal).as_vec3();
-    if cosine <= 0.0 || !scene.geometry.visible(sight.from.as_vec3(), target) {
+    let through = if cosine > 0.0 { scene.transmittance(sight.from.as_vec3(), target) } else { Colour::BLACK };
+    if through.is_black() {
         return Colour::BLACK;
     }
     let both = sight.density(point) + density_of_response(scene, receiver, w_in);
-    sight.luminance(point, w_in) * (cosine / both) * receiver.response.to(scene, receiver.normal, w_in)
+    sight.luminance(point, w_in) * through * (cosine / both) * receiver.response.to(scene, receiver.normal, w_in)
 }
 
 /// One sample of the light that emitters send where the peaked response looks: those of which `seen` knows, from the hit and the
@@ -154,10 +165,10 @@ fn sample_response(
     let Some((direction, weight)) = receiver.response.sample(scene, receiver.normal, rng) else {
         return Colour::BLACK;
     };
-    let hit = scene.geometry.closest_hit(&Ray { origin: from, direction });
+    let (hit, share) = scene.straight(&Ray { origin: from, direction }, f64::INFINITY);
     let Some((luminance, drawn)) = hit.and_then(|hit| seen(&hit, -direction)) else { return Colour::BLACK };
     let density = density_of_response(scene, receiver, -direction);
-    luminance * weight * (density / (density + drawn))
+    luminance * share * weight * (density / (density + drawn))
 }
 
 /// Density of directions drawn from the response, 0 where it is not peaked and none are drawn \[1/sr\].

@@ -52,3 +52,4 @@ mod spherical_triangle;
 mod totals;
 pub mod trajectory;
 mod varying;
+mod veils;

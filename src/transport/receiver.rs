@@ -157,11 +157,14 @@ pub fn look(scene: &Scene, ray: &Ray, rng: &mut Generator) -> Seen {
 
 /// The same for an eye ray with `direction` that has met `hit`.
 ///
-/// At a surface that has both a mirror and a finite part one of them is drawn, in proportion to their reflectance.
+/// Veils are looked through. At a surface that has both a mirror and a finite part one of them is drawn, in proportion to their reflectance.
 pub fn look_at(scene: &Scene, mut hit: Hit, mut direction: DVec3, rng: &mut Generator) -> Seen {
     let mut seen = Seen { emitted: Colour::BLACK, receiver: None };
     let mut attenuation = Colour::WHITE;
     for _ in 0..MAX_MIRRORS {
+        let (met, share) = scene.met_from(hit, direction, true, rng);
+        let Some(met) = met else { break };
+        (hit, attenuation) = (met, attenuation * share);
         if scene.absorbs(&hit) {
             break;
         }

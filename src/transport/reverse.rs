@@ -49,7 +49,10 @@ pub fn path(scene: &Scene, transport: &Transport, receiver: &Receiver, rng: &mut
     let Some((mut ray, mut weight)) = leave(scene, receiver, rng) else { return found };
     let first = weight.luminance();
     for met in 1..=MAX_VERTICES {
-        let Some(hit) = scene.geometry.closest_hit(&ray).filter(|h| !scene.absorbs(h)) else { break };
+        let Some(hit) = scene.geometry.closest_hit(&ray) else { break };
+        let (hit, share) = scene.met_from(hit, ray.direction, true, rng);
+        let Some(hit) = hit.filter(|h| !scene.absorbs(h)) else { break };
+        weight = weight * share;
         let reflectance = scene.reflectance(hit.primitive, hit.position);
         let back = -ray.direction;
         let response = |w_in| reflectance.evaluate(hit.normal, w_in, back);
@@ -102,19 +105,21 @@ fn from_lights(scene: &Scene, position: DVec3, normal: DVec3, response: impl Fn(
     for light in &scene.sources.lights {
         let (_, w_in, across) = light.at(position);
         let cosine = -normal.dot(w_in);
-        if cosine > 0.0 && !across.is_black() && is_lit(scene, lifted, light) {
-            sum += across * cosine * response(w_in);
+        if cosine > 0.0 && !across.is_black() {
+            sum += across * lit(scene, lifted, light) * cosine * response(w_in);
         }
     }
     sum
 }
 
-/// True when nothing stands between the lifted point and `light`: a ray, not the segments of the connections.
-fn is_lit(scene: &Scene, lifted: DVec3, light: &Light) -> bool {
+/// The share of light that gets from `light` to the lifted point: a ray, not the segments of the connections.
+fn lit(scene: &Scene, lifted: DVec3, light: &Light) -> Colour {
     let (from, w_in, _) = light.at(lifted);
     let distance = from.map_or(f64::INFINITY, |p| (p - lifted).length());
-    let hit = scene.geometry.closest_hit(&Ray { origin: lifted, direction: -w_in });
-    hit.is_none_or(|h| h.distance >= distance)
+    match scene.straight(&Ray { origin: lifted, direction: -w_in }, distance) {
+        (Some(hit), _) if hit.distance < distance => Colour::BLACK,
+        (_, share) => share,
+    }
 }
 
 /// Russian roulette: the weight T_{k+1} with which the path goes on, or `None` where it ends; `first` is the luminous

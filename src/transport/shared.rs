@@ -11,7 +11,7 @@
 
 use super::bodies::from_bodies;
 use super::connection::{Connectors, Link, LitPoint, Rule, Tile, connect};
-use super::direct::{from_emitters, from_panels, from_some_emitters};
+use super::direct::{from_afar, from_emitters, from_panels, from_some_emitters};
 use super::receiver::Receiver;
 use crate::geometry::Ray;
 use crate::geometry::visibility::{BUNDLE, BUNDLES, Lanes, Points, Scratch};
@@ -152,11 +152,21 @@ fn of_lights(scene: &Scene, receivers: &[Receiver]) -> Vec<Colour> {
         for (i, (receiver, (_, w_in, across))) in receivers.iter().zip(&arriving).enumerate() {
             if seen[i / BUNDLE] >> (i % BUNDLE) & 1 == 1 {
                 let cosine = -receiver.normal.dot(*w_in);
-                sums[i] += *across * cosine * receiver.response.to(scene, receiver.normal, *w_in);
+                let through =
+                    if scene.geometry.has_veils() { veiled(scene, light, lifted[i], *w_in) } else { Colour::WHITE };
+                sums[i] += *across * through * cosine * receiver.response.to(scene, receiver.normal, *w_in);
             }
         }
     }
     sums
+}
+
+/// The share that veils let through of the light that `light`, which is seen, sends to the lifted point along `w_in`.
+fn veiled(scene: &Scene, light: &Light, lifted: Vec3, w_in: DVec3) -> Colour {
+    match light.at(lifted.as_dvec3()).0 {
+        Some(position) => scene.veiled(position.as_vec3(), lifted),
+        None => from_afar(scene, &Ray { origin: lifted.as_dvec3(), direction: -w_in }),
+    }
 }
 
 /// Clears the bits of the receivers that something hides from parallel light.
@@ -165,7 +175,7 @@ fn shadow_of_parallel(scene: &Scene, direction: DVec3, receivers: &[Receiver], s
         let (bundle, lane) = (i / BUNDLE, i % BUNDLE);
         let origin = scene.geometry.lift(receiver.position, receiver.normal);
         let ray = Ray { origin, direction: -direction };
-        if seen[bundle] >> lane & 1 == 1 && scene.geometry.closest_hit(&ray).is_some() {
+        if seen[bundle] >> lane & 1 == 1 && from_afar(scene, &ray).is_black() {
             seen[bundle] &= !(1 << lane);
         }
     }

@@ -15,12 +15,14 @@ pub(super) struct Sums<const C: usize> {
     /// The part of `light` by vertices that a delta scatterer lit straight.
     pub(super) mirrored: [Column; C],
     pub(super) has_mirrored: bool,
+    /// Of one vertex at a time, what veils let through.
+    pub(super) through: [Column; C],
 }
 
 impl<const C: usize> Sums<C> {
     pub(super) fn new() -> Self {
         let zero = [[[0.0; BUNDLE]; BUNDLES]; C];
-        Sums { light: zero, mirrored: zero, has_mirrored: false }
+        Sums { light: zero, mirrored: zero, has_mirrored: false, through: zero }
     }
 
     #[inline(always)]

@@ -5,12 +5,12 @@
 //! what meets nothing has escaped, what a numerical guard stopped is lost. Russian roulette takes nothing on
 //! average, so emitted = absorbed + escaped + lost holds within the error of the roulette alone.
 
-use crate::geometry::Ray;
+use crate::geometry::{Hit, Ray};
 use crate::job::{Roulette, Transport};
 use crate::math::DVec3;
 use crate::photometry::Colour;
 use crate::random::Generator;
-use crate::scene::Scene;
+use crate::scene::{Meeting, Scene};
 
 /// Guard against chains that never end (a closed scene that absorbs nothing): more vertices are lost flux.
 const MAX_VERTICES: u32 = 1 << 16;
@@ -112,13 +112,9 @@ pub fn trace(scene: &Scene, transport: &Transport, rng: &mut Generator, record: 
     let mut weight = start.weight;
     let mut after_delta = false;
     for order in 1..=MAX_VERTICES {
-        let hit = scene.geometry.closest_hit(&ray);
-        let length = hit.map_or(f64::INFINITY, |h| h.distance);
-        record.segment(Segment { ray, length, weight, order: order - 1 });
-        let Some(hit) = hit else {
-            flux.escaped += weight.luminance();
-            return flux;
-        };
+        let way = Segment { ray, length: f64::INFINITY, weight, order: order - 1 };
+        let Some((hit, met)) = advance(scene, way, &mut flux, rng, record) else { return flux };
+        weight = met;
         if scene.absorbs(&hit) {
             flux.absorbed += weight.luminance();
             return flux;
@@ -146,6 +142,34 @@ pub fn trace(scene: &Scene, transport: &Transport, rng: &mut Generator, record: 
     }
     flux.lost += weight.luminance();
     flux
+}
+
+/// Follows light straight on, through veils, to the surface where it is met: there, with its weight; `None` where it meets none.
+fn advance(
+    scene: &Scene,
+    mut way: Segment,
+    flux: &mut FluxBalance,
+    rng: &mut Generator,
+    record: &mut impl Record,
+) -> Option<(Hit, Colour)> {
+    for _ in 0..MAX_VERTICES {
+        let hit = scene.geometry.closest_hit(&way.ray);
+        record.segment(Segment { length: hit.map_or(f64::INFINITY, |h| h.distance), ..way });
+        let Some(hit) = hit else {
+            flux.escaped += way.weight.luminance();
+            return None;
+        };
+        let meeting = scene.meet(&hit, way.ray.direction, true, rng);
+        let (Meeting::Met(share) | Meeting::Through(share)) = meeting;
+        let left = way.weight * share;
+        flux.absorbed += way.weight.luminance() - left.luminance();
+        if let Meeting::Met(_) = meeting {
+            return Some((hit, left));
+        }
+        way = Segment { ray: scene.beyond(&hit, way.ray.direction), weight: left, ..way };
+    }
+    flux.lost += way.weight.luminance();
+    None
 }
 
 /// Russian roulette: the weight with which the history goes on, `reflected` over its survival probability, or

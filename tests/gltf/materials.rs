@@ -90,12 +90,11 @@ fn a_mesh_without_material_is_white_metal_with_a_warning() {
 }
 
 #[test]
-fn alpha_normal_and_occlusion_are_ignored_with_warnings() {
+fn normal_and_occlusion_textures_are_ignored_with_warnings() {
     let texture = json!({ "index": 9 });
-    let material =
-        json!({ "name": "leaf", "alphaMode": "BLEND", "normalTexture": texture, "occlusionTexture": texture });
+    let material = json!({ "name": "leaf", "normalTexture": texture, "occlusionTexture": texture });
     let model = good(&square(material));
-    for text in ["alphaMode BLEND", "normalTexture is ignored", "occlusionTexture is ignored"] {
+    for text in ["normalTexture is ignored", "occlusionTexture is ignored"] {
         assert!(warns(&model, text), "{text}");
     }
 }

@@ -278,3 +278,54 @@ fn images_in_other_formats_are_refused_by_name() {
     assert_eq!(field, "extensionsRequired[0]");
     assert!(allowed.ends_with("export the scene without compression of its meshes"), "{allowed}");
 }
+
+/// A square whose texture is white with these values of alpha in its four quarters, in `mode`.
+fn cut(mode: &str, alpha: [u8; 4], more: Value) -> Builder {
+    let mut image = Vec::new();
+    let mut encoder = png::Encoder::new(&mut image, 2, 2);
+    encoder.set_color(png::ColorType::GrayscaleAlpha);
+    let pixels: Vec<u8> = alpha.into_iter().flat_map(|a| [255, a]).collect();
+    encoder.write_header().and_then(|mut writer| writer.write_image_data(&pixels)).expect("a vector takes all");
+    let mut material = matt(json!({}));
+    material["alphaMode"] = json!(mode);
+    material.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+    square(material, &UPRIGHT, json!({ "magFilter": NEAREST }), &image)
+}
+
+/// What goes straight on through the quarters of the square.
+fn through(builder: &Builder) -> [f64; 4] {
+    let scene = scene(good(builder));
+    [[0.25, 0.75], [0.75, 0.75], [0.25, 0.25], [0.75, 0.25]].map(|[x, y]| {
+        let [above, below] = [0.5, -0.5].map(|z| scene.place([x, y, z]).as_vec3());
+        scene.transmittance(above, below).0[0]
+    })
+}
+
+#[test]
+fn alpha_is_a_mask_or_a_share() {
+    let alpha = [0, 102, 153, 255];
+    assert_eq!(through(&cut("MASK", alpha, json!({}))), [1.0, 1.0, 0.0, 0.0]);
+    assert_eq!(through(&cut("MASK", alpha, json!({ "alphaCutoff": 0.4 }))), [1.0, 0.0, 0.0, 0.0]);
+    assert_eq!(through(&cut("MASK", alpha, json!({ "alphaCutoff": 2.0 }))), [1.0; 4]);
+    assert_eq!(through(&cut("BLEND", alpha, json!({}))), [1.0, 0.6, 0.4, 0.0]);
+    assert_eq!(through(&cut("OPAQUE", alpha, json!({}))), [0.0; 4]);
+    // What is opaque all over is no veil.
+    let opaque = scene(good(&cut("BLEND", [255; 4], json!({}))));
+    assert!(!opaque.geometry.has_veils());
+    let lit = cut("BLEND", alpha, json!({ "emissiveFactor": [1.0, 1.0, 1.0] }));
+    assert!(warns(&good(&lit), "alphaMode BLEND is ignored: the surface is opaque, as it emits"));
+    assert_eq!(through(&lit), [0.0; 4]);
+    let (field, _, allowed) = refusal(load(&cut("CUTOUT", alpha, json!({})).glb()));
+    assert_eq!((field.as_str(), allowed.as_str()), ("materials[0].alphaMode", "OPAQUE, MASK or BLEND"));
+}
+
+#[test]
+fn alpha_of_factor_and_vertices_multiply() {
+    let mut builder = cut("BLEND", [255; 4], json!({}));
+    builder.json["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = json!([1.0, 1.0, 1.0, 0.75]);
+    assert_eq!(through(&builder), [0.25; 4]);
+    let accessor = builder.accessor(&[255u8, 255, 255, 51].repeat(4), 5121, 4, "VEC4");
+    builder.json["accessors"][accessor]["normalized"] = json!(true);
+    builder.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = json!(accessor);
+    through(&builder).into_iter().for_each(|share| assert!((share - 0.85).abs() < 1e-6, "{share}"));
+}

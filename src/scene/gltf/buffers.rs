@@ -98,6 +98,16 @@ impl<'a> Buffers<'a> {
         Ok(rows)
     }
 
+    /// Colours with alpha, which is 1 where accessor `index`, which stands in `field`, has none.
+    pub fn colours(&self, index: usize, field: &str) -> Result<Vec<[f64; 4]>> {
+        let shapes = &["VEC3", "VEC4"];
+        let accessor = self.file.item(&self.document.accessors, "accessors", index, field)?;
+        if accessor.shape == "VEC4" {
+            return self.rows::<4>(index, field, shapes);
+        }
+        Ok(self.rows::<3>(index, field, shapes)?.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect())
+    }
+
     /// Indices of accessor `index`, which stands in `field`; each is below `vertices`.
     pub fn indices(&self, index: usize, field: &str, vertices: usize) -> Result<Vec<u32>> {
         let elements = self.elements(index, field, &["SCALAR"])?;

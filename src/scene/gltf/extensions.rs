@@ -5,13 +5,14 @@ use super::problem::{File, Warnings};
 use crate::error::Result;
 
 /// Extensions whose meaning is followed.
-const SUPPORTED: [&str; 8] = [
+const SUPPORTED: [&str; 9] = [
     "EXT_mesh_gpu_instancing",
     "KHR_lights_punctual",
     "EXT_lights_ies",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
     "KHR_materials_specular",
+    "KHR_materials_transmission",
     "KHR_mesh_quantization",
     "KHR_texture_transform",
 ];
@@ -53,7 +54,7 @@ fn effect(name: &str) -> Option<&'static str> {
         // How the triangles of a polygon belong together.
         "FB_ngon_encoding" => return None,
         "KHR_materials_unlit" => "its materials reflect by their metallic-roughness factors",
-        "KHR_materials_transmission" | "KHR_materials_diffuse_transmission" => "its materials are opaque",
+        "KHR_materials_diffuse_transmission" => "its materials are opaque",
         "KHR_materials_volume" | "KHR_materials_dispersion" => "its materials are opaque",
         "KHR_materials_subsurface" | "KHR_materials_volume_scatter" => {
             "its materials scatter light at their surface only"

@@ -5,11 +5,12 @@
 use std::collections::HashMap;
 
 use super::document::{Document, Material, Primitive, Specular, TextureReference};
+use super::glass::glass;
 use super::images::Images;
 use super::problem::{File, Warnings};
 use crate::error::Result;
 use crate::photometry::Colour;
-use crate::scene::textures::{Coding, Layer, Textured};
+use crate::scene::textures::{Coding, Coverage, Layer, Textured};
 use crate::scene::{Dielectric, Reflectance, Surface};
 
 /// Materials of the file and the surfaces made of them.
@@ -100,7 +101,7 @@ impl<'a> Materials<'a> {
         let factors = &material.pbr_metallic_roughness;
         let inside = format!("{path}.pbrMetallicRoughness");
         let share = |field: &str, value| self.file.between(format_args!("{inside}.{field}"), value, 0.0, 1.0);
-        let [r, g, b, _] =
+        let [r, g, b, alpha] =
             self.file.all_between(format_args!("{inside}.baseColorFactor"), factors.base_color_factor, 0.0, 1.0)?;
         let metallic = share("metallicFactor", factors.metallic_factor)?;
         let roughness = share("roughnessFactor", factors.roughness_factor)?;
@@ -112,30 +113,40 @@ impl<'a> Materials<'a> {
         let dielectric = self.dielectric(material, path, name, warnings)?;
         let colour = Colour([r, g, b]);
         let [_, green, blue, _] = data.mean;
-        let reflectance = Reflectance::layered(colour * rgb(base.mean), metallic * blue, roughness * green, dielectric);
+        let glass = glass(self.file, material, (path, name), colour * rgb(base.mean), warnings)?;
+        let is_glass = glass.is_some();
+        let reflectance = glass.unwrap_or_else(|| {
+            Reflectance::layered(colour * rgb(base.mean), metallic * blue, roughness * green, dielectric)
+        });
         if data.layer.is_some() {
             warnings.add(format!("material `{name}`: the roughness of its texture is rounded to steps of 1/255"));
         }
         let surface = Surface {
             name: name.clone(),
             reflectance,
-            double_sided: material.double_sided,
+            // Glass has no back.
+            double_sided: material.double_sided || is_glass,
             emission: emission * rgb(glow.mean),
         };
-        let varies = [&base, &data, &glow].iter().any(|slot| slot.layer.is_some());
+        let coverage = self.coverage(&reading, alpha, &base, warnings)?;
+        let is_laid = base.layer.is_some();
+        let laid = [&base, &data, &glow].iter().any(|slot| slot.layer.is_some());
+        let varies = !is_glass && (*coloured || laid || coverage != Coverage::Whole);
         let textured = Textured {
             sets: if *mapped { sets(material).len() } else { 0 },
             coloured: *coloured,
             // A texture that is not laid out counts by its mean, and is part of the factor then.
-            base: if base.layer.is_some() { colour } else { colour * rgb(base.mean) },
+            base: if is_laid { colour } else { colour * rgb(base.mean) },
             base_layer: base.layer,
             factors: if data.layer.is_some() { [metallic, roughness] } else { [metallic * blue, roughness * green] },
             data_layer: data.layer,
             dielectric,
             emission,
             emission_layer: glow.layer,
+            coverage,
+            alpha: if is_laid { alpha } else { alpha * base.mean[3] },
         };
-        Ok((surface, (varies || *coloured).then_some(textured)))
+        Ok((surface, varies.then_some(textured)))
     }
 
     /// The texture `reference`, which stands in `field`.
@@ -156,6 +167,30 @@ impl<'a> Materials<'a> {
         let place = sets(reading.material).iter().position(|&set| set == layer.set);
         layer.set = place.expect("it is among the coordinates of its material");
         Ok(Slot { mean, layer: Some(layer) })
+    }
+
+    /// What the `alpha` of the base colour and of its texture `base` means.
+    fn coverage(&self, reading: &Reading, alpha: f64, base: &Slot, warnings: &mut Warnings) -> Result<Coverage> {
+        let Reading { material, path, name, coloured, .. } = reading;
+        let cutoff = self.file.between(format_args!("{path}.alphaCutoff"), material.alpha_cutoff, 0.0, f64::MAX)?;
+        let coverage = match material.alpha_mode.as_str() {
+            "OPAQUE" => return Ok(Coverage::Whole),
+            "MASK" => Coverage::Mask(cutoff),
+            "BLEND" => Coverage::Blend,
+            other => return Err(self.file.bad(format_args!("{path}.alphaMode"), other, "OPAQUE, MASK or BLEND")),
+        };
+        let least = base.layer.as_ref().map_or(base.mean[3], |layer| layer.image.range(3).0);
+        let enough = if let Coverage::Mask(cutoff) = coverage { cutoff } else { 1.0 };
+        // Many exporters ask for it everywhere.
+        if !coloured && alpha * least >= enough {
+            return Ok(Coverage::Whole);
+        }
+        let mode = &material.alpha_mode;
+        if !self.emission(material, path)?.is_black() {
+            warnings.add(format!("material `{name}`: alphaMode {mode} is ignored: the surface is opaque, as it emits"));
+            return Ok(Coverage::Whole);
+        }
+        Ok(coverage)
     }
 
     /// Emitted luminance without texture \[cd/m2\].
@@ -237,8 +272,5 @@ fn note_ignored(material: &Material, name: &str, warnings: &mut Warnings) {
     }
     if material.occlusion_texture.is_some() {
         warnings.add(format!("material `{name}`: occlusionTexture is ignored: shadows are computed"));
-    }
-    if material.alpha_mode != "OPAQUE" {
-        warnings.add(format!("material `{name}`: alphaMode {} is ignored: the surface is opaque", material.alpha_mode));
     }
 }

@@ -232,7 +232,7 @@ impl<'a> Baker<'a> {
         }
         if textured.coloured {
             let (index, field) = accessor("COLOR_0");
-            let mut rows = self.buffers.rows::<3>(index, &field, &["VEC3", "VEC4"])?;
+            let mut rows = self.buffers.colours(index, &field)?;
             rows.as_flattened_mut().iter_mut().for_each(|channel| *channel = channel.clamp(0.0, 1.0));
             add("COLOR_0", rows.iter().map(|row| &row[..]).collect())?;
         }

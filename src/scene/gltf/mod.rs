@@ -9,13 +9,15 @@
 //! model or an [`Error::Input`](crate::error::Error::Input) that names the field, never a panic.
 //!
 //! The order of the work, a file each: container and JSON (`document`), `extensions`, `buffers`, `nodes`, and at each
-//! node its mesh (`meshes`, `instances`, `materials`, `images`, `decode`), camera (`cameras`) and lights (`lights`, `ies`).
+//! node its mesh (`meshes`, `instances`, `materials`, `glass`, `images`, `decode`), camera (`cameras`) and lights (`lights`,
+//! `ies`).
 
 mod buffers;
 mod cameras;
 mod decode;
 mod document;
 mod extensions;
+mod glass;
 mod ies;
 mod images;
 mod instances;

@@ -8,9 +8,11 @@
 //! `delta_reflectance` is its reflectance. Knows no geometry, no receivers and no wavelengths beyond three channels.
 
 mod albedo;
+mod delta;
 mod glossy;
 mod lanes;
 mod microfacet;
+mod pane;
 mod specular;
 
 use crate::math::{DVec3, PI, to_world};
@@ -18,8 +20,10 @@ use crate::photometry::Colour;
 use crate::random::{Generator, cosine_hemisphere};
 use glossy::Glossy;
 
+pub use delta::Delta;
 pub use glossy::Dielectric;
 pub use lanes::{LawInLanes, Tint, Tints, weights_over_tolerated};
+pub use pane::Pane;
 pub use specular::Finish;
 
 /// pi f from which on a law counts as peaked: a connection may then weigh this many times one to a white matt surface.
@@ -35,6 +39,8 @@ pub enum Reflectance {
     Lambert(Colour),
     /// A specular part, rough or a mirror, over a diffuse one; from [`Reflectance::metallic_roughness`].
     Glossy(Box<Glossy>),
+    /// Delta components alone: mirrors and glass.
+    Delta(Delta),
 }
 
 /// A sampled continuation of a trajectory.
@@ -84,11 +90,12 @@ impl Reflectance {
         Reflectance::Glossy(Box::new(Glossy::new(base, metallic, dielectric, finish.clone())))
     }
 
-    /// The law of the same material with another base colour.
+    /// The law of the same material with another base colour; glass and mirrors have none.
     pub fn with_base(&self, base: Colour) -> Self {
         match self {
             Reflectance::Lambert(_) => Reflectance::Lambert(base),
             Reflectance::Glossy(law) => Reflectance::Glossy(Box::new(law.with_base(base))),
+            Reflectance::Delta(law) => Reflectance::Delta(law.clone()),
         }
     }
 
@@ -98,6 +105,7 @@ impl Reflectance {
             Reflectance::Lambert(rho) if above(normal, w_in, w_out) => *rho / PI,
             Reflectance::Lambert(_) => Colour::BLACK,
             Reflectance::Glossy(law) => law.evaluate(normal, w_in, w_out),
+            Reflectance::Delta(_) => Colour::BLACK,
         }
     }
 
@@ -109,6 +117,7 @@ impl Reflectance {
                 Some(Scattered { direction, factor: *rho, delta: false })
             }
             Reflectance::Glossy(law) => law.sample(normal, w_in, rng),
+            Reflectance::Delta(law) => law.sample(normal, w_in),
         }
     }
 
@@ -119,6 +128,7 @@ impl Reflectance {
             Reflectance::Lambert(_) if above(normal, w_in, w_out) => w_out.dot(normal) / PI,
             Reflectance::Lambert(_) => 0.0,
             Reflectance::Glossy(law) => law.pdf(normal, w_in, w_out),
+            Reflectance::Delta(_) => 0.0,
         }
     }
 
@@ -128,6 +138,7 @@ impl Reflectance {
         match self {
             Reflectance::Lambert(rho) => *rho,
             Reflectance::Glossy(law) => law.albedo(cosine),
+            Reflectance::Delta(law) => law.reflectance(cosine),
         }
     }
 
@@ -136,6 +147,7 @@ impl Reflectance {
         match self {
             Reflectance::Lambert(_) => None,
             Reflectance::Glossy(law) => law.delta_reflectance(cosine),
+            Reflectance::Delta(law) => Some(law.reflectance(cosine)),
         }
     }
 
@@ -143,14 +155,14 @@ impl Reflectance {
     pub fn lambert(&self) -> Option<Colour> {
         match self {
             Reflectance::Lambert(rho) => Some(*rho),
-            Reflectance::Glossy(_) => None,
+            Reflectance::Glossy(_) | Reflectance::Delta(_) => None,
         }
     }
 
     /// The law where f depends on the directions, for many of them at once; `None` of Lambert surfaces.
     pub fn lanes(&self) -> Option<&LawInLanes> {
         match self {
-            Reflectance::Lambert(_) => None,
+            Reflectance::Lambert(_) | Reflectance::Delta(_) => None,
             Reflectance::Glossy(law) => Some(law.lanes()),
         }
     }
@@ -160,6 +172,7 @@ impl Reflectance {
         match self {
             Reflectance::Lambert(_) => Colour::WHITE,
             Reflectance::Glossy(law) => law.through(cosine),
+            Reflectance::Delta(_) => Colour::BLACK,
         }
     }
 
@@ -168,6 +181,7 @@ impl Reflectance {
         match self {
             Reflectance::Lambert(_) => false,
             Reflectance::Glossy(law) => law.has_delta(),
+            Reflectance::Delta(_) => true,
         }
     }
 
@@ -176,6 +190,7 @@ impl Reflectance {
         match self {
             Reflectance::Lambert(rho) => rho.is_black(),
             Reflectance::Glossy(law) => law.is_black(),
+            Reflectance::Delta(_) => true,
         }
     }
 
@@ -183,7 +198,7 @@ impl Reflectance {
     /// a direction 60 degrees from the normal is mirrored.
     pub fn is_peaked(&self) -> bool {
         match self {
-            Reflectance::Lambert(_) => false,
+            Reflectance::Lambert(_) | Reflectance::Delta(_) => false,
             Reflectance::Glossy(law) => law.is_peaked(),
         }
     }
@@ -192,7 +207,7 @@ impl Reflectance {
     /// peak.
     pub fn is_peaked_at(&self, cosine: f64) -> bool {
         match self {
-            Reflectance::Lambert(_) => false,
+            Reflectance::Lambert(_) | Reflectance::Delta(_) => false,
             Reflectance::Glossy(law) => law.is_peaked_at(cosine),
         }
     }
@@ -202,6 +217,7 @@ impl Reflectance {
         match self {
             Reflectance::Lambert(_) => 1.0,
             Reflectance::Glossy(law) => law.lobe_width(),
+            Reflectance::Delta(_) => 0.0,
         }
     }
 
@@ -217,6 +233,7 @@ impl Reflectance {
         match self {
             Reflectance::Lambert(rho) => Reflectance::Lambert(Colour::grey(rho.luminance())),
             Reflectance::Glossy(law) => Reflectance::Glossy(Box::new(law.grey())),
+            Reflectance::Delta(law) => Reflectance::Delta(law.grey()),
         }
     }
 }

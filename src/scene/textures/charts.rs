@@ -10,7 +10,7 @@ const NONE: u32 = u32::MAX;
 pub struct Charts {
     /// Of each triangle where its own numbers begin in `values`; shorter than the list of triangles, and empty where nothing varies.
     first: Vec<u32>,
-    /// Corner by corner: pairs of coordinates, and then, where the surface has them, three of colour.
+    /// Corner by corner: pairs of coordinates, and then, where the surface has them, four of colour and alpha.
     values: Vec<f32>,
 }
 

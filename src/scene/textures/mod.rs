@@ -25,6 +25,17 @@ use crate::math::{DVec2, DVec3};
 use crate::photometry::Colour;
 use rayon::prelude::*;
 
+/// How much of the light that meets a place the surface covers there; the rest goes straight on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Coverage {
+    /// All of it.
+    Whole,
+    /// All where alpha is this or more, and nothing elsewhere.
+    Mask(f64),
+    /// The share alpha.
+    Blend,
+}
+
 /// Steps of roughness between 0 and 1.
 const STEPS: f64 = 255.0;
 
@@ -49,6 +60,10 @@ pub struct Textured {
     pub emission: Colour,
     /// What multiplies it.
     pub emission_layer: Option<Layer>,
+    /// What alpha means.
+    pub coverage: Coverage,
+    /// Alpha without texture: that of the base colour's, and of the vertices, multiply it.
+    pub alpha: f64,
 }
 
 /// All surfaces that vary.
@@ -145,6 +160,29 @@ impl Textures {
         Some(Glow::new(layer, corners, textured.emission, self.grey))
     }
 
+    /// True where light may go straight on through `triangle` on `surface`.
+    pub(super) fn is_veil(&self, surface: u32, triangle: u32) -> bool {
+        self.of(surface, triangle).is_some_and(|textured| textured.coverage != Coverage::Whole)
+    }
+
+    /// The share of light that `textured` covers at `place`.
+    pub(super) fn covered(&self, textured: &Textured, place: Place) -> f64 {
+        let mut alpha = textured.alpha;
+        if let Some(layer) = &textured.base_layer {
+            alpha *= self.read(textured, layer, place)[3];
+        }
+        if textured.coloured {
+            let Place { triangle, weights } = place;
+            let [of_vertices] = self.charts.blend(triangle, textured.width(), 2 * textured.sets + 3, weights);
+            alpha *= of_vertices;
+        }
+        match textured.coverage {
+            Coverage::Whole => 1.0,
+            Coverage::Mask(cutoff) => f64::from(u8::from(alpha >= cutoff)),
+            Coverage::Blend => alpha.clamp(0.0, 1.0),
+        }
+    }
+
     /// Base colour at `place`.
     fn base(&self, textured: &Textured, place: Place) -> Colour {
         let mut base = textured.base;
@@ -205,7 +243,7 @@ impl Textures {
 impl Textured {
     /// Numbers at each corner.
     pub fn width(&self) -> usize {
-        2 * self.sets + if self.coloured { 3 } else { 0 }
+        2 * self.sets + if self.coloured { 4 } else { 0 }
     }
 }
 

@@ -14,6 +14,7 @@ pub struct Material {
     pub emissive_texture: Option<TextureReference>,
     pub emissive_factor: [f64; 3],
     pub alpha_mode: String,
+    pub alpha_cutoff: f64,
     pub double_sided: bool,
     pub extensions: MaterialExtensions,
 }
@@ -27,7 +28,8 @@ impl Default for Material {
             occlusion_texture: None,
             emissive_texture: None,
             emissive_factor: [0.0; 3],
-            alpha_mode: opaque(),
+            alpha_mode: "OPAQUE".to_owned(),
+            alpha_cutoff: 0.5,
             double_sided: false,
             extensions: MaterialExtensions::default(),
         }
@@ -65,6 +67,25 @@ pub struct MaterialExtensions {
     pub ior: Option<Ior>,
     #[serde(rename = "KHR_materials_specular")]
     pub specular: Option<Specular>,
+    #[serde(rename = "KHR_materials_transmission")]
+    pub transmission: Option<Transmission>,
+    #[serde(rename = "KHR_materials_volume")]
+    pub volume: Option<Volume>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub struct Transmission {
+    #[serde(default)]
+    pub transmission_factor: f64,
+    pub transmission_texture: Option<TextureReference>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub struct Volume {
+    #[serde(default)]
+    pub thickness_factor: f64,
 }
 
 #[derive(Deserialize)]
@@ -89,10 +110,6 @@ pub struct Specular {
 pub struct EmissiveStrength {
     #[serde(default = "one")]
     pub emissive_strength: f64,
-}
-
-fn opaque() -> String {
-    "OPAQUE".to_owned()
 }
 
 fn glass() -> f64 {

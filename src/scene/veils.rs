@@ -1,0 +1,143 @@
+//! Surfaces that let light through straight on: what is left of it, and where it is met.
+//!
+//! Light that goes straight through a veil stays on its segment: visibility becomes a transmittance, and no vertex, no
+//! reflection and no delta scatterer is counted. What is not let through is *met*: the surface's law of reflection has it, and
+//! its albedo is a share of what is met.
+
+use super::textures::Place;
+use super::{Delta, Reflectance, Scene, Surface};
+use crate::geometry::{Hit, Ray};
+use crate::math::{DVec3, Vec3};
+use crate::photometry::Colour;
+use crate::random::Generator;
+
+/// Guard against rays that never end among veils.
+const MAX_VEILS: u32 = 1 << 16;
+
+/// What becomes of light, or of an eye ray, at a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Meeting {
+    /// It goes straight on, with this share of its weight.
+    Through(Colour),
+    /// The surface's law of reflection decides, with this share of its weight.
+    Met(Colour),
+}
+
+impl Surface {
+    /// True when its law lets light through straight on.
+    pub fn is_veil(&self) -> bool {
+        matches!(self.reflectance, Reflectance::Delta(Delta::Pane(_)))
+    }
+
+    /// The share of light that goes straight on through it, `cosine` is that of incidence, above 0.
+    fn transmittance(&self, cosine: f64) -> Colour {
+        match &self.reflectance {
+            Reflectance::Delta(Delta::Pane(pane)) => pane.transmittance(cosine),
+            _ => Colour::BLACK,
+        }
+    }
+}
+
+impl Scene {
+    /// The share of light that goes straight on through the surface `primitive` \[1\].
+    pub fn let_through(&self, primitive: u32, position: DVec3, cosine: f64) -> Colour {
+        let surface = self.surface_of[primitive as usize];
+        match self.textures.of(surface, primitive) {
+            Some(textured) => {
+                let place = Place::new(primitive, self.geometry.triangle(primitive), position);
+                Colour::grey(1.0 - self.textures.covered(textured, place))
+            }
+            None => self.surfaces[surface as usize].transmittance(cosine),
+        }
+    }
+
+    /// True where light may go straight on through the surface `primitive`.
+    fn is_veil(&self, primitive: u32) -> bool {
+        let surface = self.surface_of[primitive as usize];
+        self.surfaces[surface as usize].is_veil() || self.textures.is_veil(surface, primitive)
+    }
+
+    /// The share of light that gets straight from one lifted point to another: 0 where a surface blocks, 1 where nothing is between.
+    pub fn transmittance(&self, a: Vec3, b: Vec3) -> Colour {
+        if self.geometry.visible(a, b) { self.veiled(a, b) } else { Colour::BLACK }
+    }
+
+    /// The same of the veils alone.
+    pub fn veiled(&self, a: Vec3, b: Vec3) -> Colour {
+        let mut share = Colour::WHITE;
+        self.geometry.veils_between(a, b, |c| share = share * self.let_through(c.primitive, c.position, c.cosine));
+        share
+    }
+
+    /// The first surface along `ray` that lets nothing through, where it is at most `limit` away \[m\], and the share of light that goes
+    /// straight from the one to the other.
+    pub fn straight(&self, ray: &Ray, limit: f64) -> (Option<Hit>, Colour) {
+        let (mut ray, mut share, mut gone) = (*ray, Colour::WHITE, 0.0);
+        for _ in 0..MAX_VEILS {
+            let Some(hit) = self.geometry.closest_hit_within(&ray, limit - gone) else { return (None, share) };
+            let here = Hit { distance: gone + hit.distance, ..hit };
+            let cosine = -ray.direction.dot(hit.normal);
+            if !self.is_veil(hit.primitive) {
+                return (Some(here), share);
+            }
+            let through = self.let_through(hit.primitive, hit.position, cosine);
+            if through.is_black() {
+                return (Some(here), share);
+            }
+            share = share * through;
+            gone = here.distance;
+            ray = self.beyond(&hit, ray.direction);
+        }
+        (None, Colour::BLACK)
+    }
+
+    /// The ray that goes on along `direction` behind the surface that it met at `hit`.
+    pub fn beyond(&self, hit: &Hit, direction: DVec3) -> Ray {
+        Ray { origin: self.geometry.lift(hit.position, -hit.normal), direction }
+    }
+
+    /// Chooses whether light along `direction` goes on behind `hit` or is met there; without a choice no number is drawn. With `mirrors`
+    /// what a pane mirrors is wanted; without it is not followed, and all that gets through goes on.
+    pub fn meet(&self, hit: &Hit, direction: DVec3, mirrors: bool, rng: &mut Generator) -> Meeting {
+        if !self.is_veil(hit.primitive) {
+            return Meeting::Met(Colour::WHITE);
+        }
+        let cosine = -direction.dot(hit.normal);
+        let through = self.let_through(hit.primitive, hit.position, cosine);
+        let rest = Colour::WHITE + through * -1.0;
+        // What is met counts as much as it reflects; where connections start from it, all of it.
+        let reflectance = self.reflectance(hit.primitive, hit.position);
+        let kept = match (reflectance.is_black(), mirrors) {
+            (false, _) => rest.luminance(),
+            (true, true) => (rest * reflectance.albedo(cosine)).luminance(),
+            (true, false) => 0.0,
+        };
+        let passed = through.luminance();
+        if passed == 0.0 {
+            return Meeting::Met(rest);
+        }
+        let probability = passed / (passed + kept);
+        if kept == 0.0 || rng.chance(probability) {
+            Meeting::Through(through / if kept == 0.0 { 1.0 } else { probability })
+        } else {
+            Meeting::Met(rest / (1.0 - probability))
+        }
+    }
+
+    /// From `hit` straight on along `direction` to where it is met: by chance where a surface reflects what it does not let
+    /// through, `mirrors` as in [`Scene::meet`]. The share of weight that gets there.
+    pub fn met_from(&self, hit: Hit, direction: DVec3, mirrors: bool, rng: &mut Generator) -> (Option<Hit>, Colour) {
+        let (mut hit, mut share) = (hit, Colour::WHITE);
+        for _ in 0..MAX_VEILS {
+            match self.meet(&hit, direction, mirrors, rng) {
+                Meeting::Met(met) => return (Some(hit), share * met),
+                Meeting::Through(through) => share = share * through,
+            }
+            match self.geometry.closest_hit(&self.beyond(&hit, direction)) {
+                Some(next) => hit = next,
+                None => return (None, share),
+            }
+        }
+        (None, Colour::BLACK)
+    }
+}
