@@ -18,8 +18,8 @@ pub(super) struct Connector {
     pub(super) order: u32,
     /// True where the bound does not apply.
     pub(super) after_delta: bool,
-    /// Where the law of reflection depends on direction.
-    pub(super) glossy: Option<GlossyConnector>,
+    /// Where the law of reflection depends on direction; apart, so that matt vertices stay small.
+    pub(super) glossy: Option<Box<GlossyConnector>>,
     /// Number of the emitter of which this is a point and no vertex.
     pub(super) emitter: Option<u32>,
 }
@@ -111,12 +111,14 @@ fn connector(scene: &Scene, v: &Vertex) -> Connector {
         intensity: narrow(v.weight * reflectance.lambert().unwrap_or(Colour::BLACK) / PI),
         order: v.order,
         after_delta: v.after_delta,
-        glossy: reflectance.lanes().map(|law| GlossyConnector {
-            law: law.clone(),
-            is_peaked: reflectance.is_peaked(),
-            from: -v.w_in.as_vec3(),
-            through: narrow(reflectance.through(-v.w_in.dot(v.normal))),
-            weight: narrow(v.weight),
+        glossy: reflectance.lanes().map(|law| {
+            Box::new(GlossyConnector {
+                law: law.clone(),
+                is_peaked: reflectance.is_peaked(),
+                from: -v.w_in.as_vec3(),
+                through: narrow(reflectance.through(-v.w_in.dot(v.normal))),
+                weight: narrow(v.weight),
+            })
         }),
         emitter: None,
     }
