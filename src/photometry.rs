@@ -21,7 +21,7 @@ impl Colour {
     pub const WHITE: Colour = Colour([1.0; 3]);
 
     /// The same value in every channel.
-    pub fn grey(value: f64) -> Self {
+    pub const fn grey(value: f64) -> Self {
         Colour([value; 3])
     }
 

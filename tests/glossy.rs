@@ -122,7 +122,8 @@ fn assert_same_point_is_exact(case: &Case, meter: Receiver) {
     let down = Ray { origin: meter.position + 0.1 * DVec3::Y, direction: DVec3::NEG_Y };
     let floor = case.scene.geometry.closest_hit(&down).unwrap();
     let to_eye = DVec3::new(0.3, 0.8, 0.1).normalize();
-    let response = Response::reflectance(&case.scene, (floor.primitive, floor.normal), to_eye, Colour::WHITE, 0.0);
+    let response =
+        Response::reflectance(&case.scene, (floor.primitive, floor.position, floor.normal), to_eye, Colour::WHITE, 0.0);
     let histories = histories(case, 256);
     let connected = common::connect(&case.scene, &histories, f64::INFINITY, &[meter, Receiver { response, ..meter }]);
     let (e, l) = (connected[0].sum.luminance(), connected[1].sum.luminance());
@@ -167,7 +168,7 @@ fn glossy_receiver_in_a_white_furnace() {
     let receiver = |&to_eye: &DVec3| Receiver {
         position: case.scene.place([0.35, 0.0, 0.45]),
         normal: DVec3::Y,
-        response: Response::reflectance(&case.scene, (primitive, DVec3::Y), to_eye, Colour::WHITE, 0.0),
+        response: Response::reflectance(&case.scene, (primitive, patch, DVec3::Y), to_eye, Colour::WHITE, 0.0),
     };
     let receivers: Vec<Receiver> = directions.iter().map(receiver).collect();
     let stream = Stream::new(44, Domain::Trajectory, "");
@@ -210,7 +211,8 @@ fn connections_in_lanes_are_those_of_single_pairs() {
         let to_eye = to_world(hit.normal, cosine_hemisphere(rng.uniform2()));
         let attenuation = Colour([1.0, 0.5, 0.25]);
         let carried = [0.0, 0.3, 2.0][i % 3];
-        let response = Response::reflectance(scene, (hit.primitive, hit.normal), to_eye, attenuation, carried);
+        let response =
+            Response::reflectance(scene, (hit.primitive, hit.position, hit.normal), to_eye, attenuation, carried);
         receivers.push(Receiver { position: hit.position.as_vec3().as_dvec3(), normal: hit.normal, response });
         trace(scene, &case.job.transport, &mut rng, &mut vertices);
     }

@@ -13,7 +13,7 @@ use std::process::Command;
 const GOLDEN: (u32, &str, &str) = (
     5,
     "d4c1dc445ba9e0228a22b5906713d203bafca2dd6ca40df707ee6105c1e77a6b",
-    "455e844bbf6a9547b45f2ca7114979dd4fa288a7779a70dfc08b8745c68fd069",
+    "a913b25a43a3b45d67d1893f632224605244bbd37374273864783505cfe358c8",
 );
 
 #[test]

@@ -61,13 +61,13 @@ fn connection_loop(which: segments::Scene, what: &str, reflectance: Reflectance)
     let job = format!("scene = \"memory\"\n{}{}", omni([3.0, 2.0, 2.5], 1.0), point("p", [3.0, 2.0, 2.0], UP));
     let (_, scene) = prepare(&job, model);
     let place = |p: Vec3| scene.place(p.as_dvec3().to_array());
-    let response = |normal: DVec3| match matt {
+    let response = |position: DVec3, normal: DVec3| match matt {
         true => Response::Cosine,
-        false => Response::reflectance(&scene, (0, normal), normal, Colour::WHITE, 0.0),
+        false => Response::reflectance(&scene, (0, position, normal), normal, Colour::WHITE, 0.0),
     };
     let receiver = |p: &Place| {
-        let normal = p.normal.as_dvec3();
-        Receiver { position: place(p.point), normal, response: response(normal) }
+        let (position, normal) = (place(p.point), p.normal.as_dvec3());
+        Receiver { position, normal, response: response(position, normal) }
     };
     let vertex = |p: &Place| Vertex {
         position: place(p.point),

@@ -103,7 +103,7 @@ fn bound_of_set(job: &Job, scene: &Scene, set: &ReceiverSet) -> f64 {
 
 /// What a vertex reflects \[lm\].
 fn reflected(scene: &Scene, v: &Vertex) -> Colour {
-    v.weight * scene.surface(v.primitive).reflectance.albedo(-v.w_in.dot(v.normal))
+    v.weight * scene.reflectance(v.primitive, v.position).albedo(-v.w_in.dot(v.normal))
 }
 
 /// Indirect illuminance at `receiver` by plain local estimation, all vertices taken as matt \[lx\].

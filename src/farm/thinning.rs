@@ -84,7 +84,7 @@ impl<'a> Thinning<'a> {
 
 /// Flux that a vertex reflects, summed over channels, so that none is lost whatever its colour \[lm\].
 fn reflected(scene: &Scene, vertex: &Vertex) -> f64 {
-    let albedo = scene.surface(vertex.primitive).reflectance.albedo(-vertex.w_in.dot(vertex.normal));
+    let albedo = scene.reflectance(vertex.primitive, vertex.position).albedo(-vertex.w_in.dot(vertex.normal));
     (vertex.weight * albedo).0.iter().sum()
 }
 

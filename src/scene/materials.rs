@@ -27,6 +27,7 @@ impl Model {
                 return Err(Error::input(job, format!("{at}.name"), material.name(), "glass on what does not emit"));
             }
             surface.reflectance = law.clone();
+            self.textures.make_uniform(number);
             surface.double_sided |= both;
         }
         Ok(())
@@ -53,6 +54,7 @@ impl Model {
             let new = known.unwrap_or_else(|| {
                 let copy = Surface { name: name.to_owned(), ..self.surfaces[*surface as usize].clone() };
                 self.surfaces.push(copy);
+                self.textures.copy(*surface as usize, self.surfaces.len() - 1);
                 made.push((*surface, self.surfaces.len() - 1));
                 self.surfaces.len() - 1
             });

@@ -24,6 +24,7 @@ mod replace;
 mod road_table;
 mod sky;
 mod source;
+pub mod textures;
 mod veils;
 
 pub use beam::Beam;
@@ -36,7 +37,8 @@ pub use nodes::{Node, Nodes};
 pub use opening::{Aim, Opening};
 pub use panel::{Extended, Panel};
 pub use reflectance::{
-    Delta, Glass, LawInLanes, Pane, Reflectance, Scattered, Tabulated, weight_over_tolerated, weights_over_tolerated,
+    Delta, Dielectric, Finish, Glass, LawInLanes, Pane, Reflectance, Scattered, Tabulated, Tint, Tints,
+    weight_over_tolerated, weights_over_tolerated,
 };
 pub use road_table::law_of_road;
 pub use sky::Sky;
@@ -44,11 +46,13 @@ pub use source::{Emission, Emitter, Sources};
 pub use veils::Meeting;
 
 use self::photometric_web::Luminaire;
+use self::textures::{Place, Textures};
 use crate::error::{Error, Result};
 use crate::geometry::{Build, Geometry, Harmonic, Hit, Plane, Sphere};
 use crate::job::{self, Channels, Job};
 use crate::math::DVec3;
 use crate::photometry::Colour;
+use std::borrow::Cow;
 
 /// Largest luminous flux of a scene \[lm\]: the Sun on a country, and far from what f32 can hold.
 const MAX_FLUX: f64 = 1e15;
@@ -58,11 +62,11 @@ const MAX_FLUX: f64 = 1e15;
 pub struct Surface {
     /// Name in the file it came from.
     pub name: String,
-    /// Law of reflection.
+    /// Law of reflection; of a surface that varies, that of its means: [`Scene::reflectance`] has the law at a place.
     pub reflectance: Reflectance,
     /// True when the back reflects and emits like the front; else the back absorbs.
     pub double_sided: bool,
-    /// Emitted luminance \[cd/m2\], the same in all directions.
+    /// Emitted luminance \[cd/m2\], the same in all directions; its mean where a texture varies it.
     pub emission: Colour,
 }
 
@@ -94,6 +98,8 @@ pub struct Model {
     pub surface_of: Vec<u32>,
     /// Materials.
     pub surfaces: Vec<Surface>,
+    /// What of them varies from place to place.
+    pub textures: Textures,
     /// The nodes at which the triangles hang.
     pub nodes: Nodes,
     /// Lights without extent.
@@ -134,6 +140,7 @@ pub struct Scene {
     /// Added to a position of the job or of the file it gives the position in the scene \[m\].
     offset: DVec3,
     surfaces: Vec<Surface>,
+    textures: Textures,
     surface_of: Vec<u32>,
     has_peaks: bool,
     narrowest_lobe: f64,
@@ -165,7 +172,9 @@ impl Scene {
         let corners: Vec<_> = corners.collect();
         let mut surfaces: Vec<Surface> = model.surfaces.into_iter().map(|s| painted(s, job.run.channels)).collect();
         let mut surface_of = model.surface_of;
-        let veils: Vec<bool> = surface_of.iter().map(|&s| surfaces[s as usize].is_veil()).collect();
+        let is_veil =
+            |(triangle, &s): (u32, &u32)| surfaces[s as usize].is_veil() || model.textures.is_veil(s, triangle);
+        let veils: Vec<bool> = (0..).zip(&surface_of).map(is_veil).collect();
         let harmonics = model.replacements.iter().map(|r| r.harmonic.clone().moved(offset)).collect();
         let geometry = Geometry::veiled(&corners, &veils, build)
             .with_quadrics(spheres(job, offset), planes(job, offset))
@@ -178,7 +187,8 @@ impl Scene {
         let mut nodes = model.nodes;
         nodes.of_replacements = (surface_of.len() as u32, model.replacements.iter().filter_map(|r| r.node).collect());
         surface_of.extend(model.replacements.iter().map(|r| r.surface));
-        let emitters = emitters(&geometry, &surfaces, &surface_of);
+        let textures = model.textures.prepared(job.run.channels == Channels::Luminance);
+        let emitters = emitters(&geometry, &surfaces, &surface_of, &textures);
         let sky = job.sky.as_ref().map(Sky::of_job);
         let sun = sky.iter().filter_map(|sky| sky.sun.clone());
         let lights = model.lights.into_iter().chain(job.sources.iter().filter_map(Light::of_job)).chain(sun);
@@ -216,9 +226,10 @@ impl Scene {
         }
         let cameras = model.cameras.into_iter().map(|c| CameraNode { eye: c.eye + offset, ..c }).collect();
         let used = || surface_of.iter().map(|&s| &surfaces[s as usize].reflectance);
-        let has_peaks = used().any(Reflectance::is_peaked);
-        let narrowest_lobe = used().map(Reflectance::lobe_width).fold(1.0, f64::min);
-        let reflects = used().any(|r| !r.is_black());
+        let extremes: Vec<Reflectance> = textures.extremes(|s| &surfaces[s].reflectance).collect();
+        let has_peaks = used().chain(&extremes).any(Reflectance::is_peaked);
+        let narrowest_lobe = used().chain(&extremes).map(Reflectance::lobe_width).fold(1.0, f64::min);
+        let reflects = used().chain(&extremes).any(|r| !r.is_black());
         Ok(Scene {
             geometry,
             sources,
@@ -227,6 +238,7 @@ impl Scene {
             warnings,
             offset,
             surfaces,
+            textures,
             surface_of,
             has_peaks,
             narrowest_lobe,
@@ -256,12 +268,31 @@ impl Scene {
         self.surfaces.iter().zip(used).filter(|(_, used)| *used).map(|(surface, _)| surface)
     }
 
+    /// The law of reflection of a primitive at `position` \[m\].
+    pub fn reflectance(&self, primitive: u32, position: DVec3) -> Cow<'_, Reflectance> {
+        let uniform = &self.surface(primitive).reflectance;
+        match self.textures.of(self.surface_of[primitive as usize], primitive) {
+            None => Cow::Borrowed(uniform),
+            Some(textured) => {
+                let place = Place::new(primitive, self.geometry.triangle(primitive), position);
+                Cow::Owned(self.textures.law(textured, uniform, place))
+            }
+        }
+    }
+
     /// Luminance that a surface emits where `hit`, towards the unit vector `w` \[cd/m2\]; of its lit side.
     pub fn emitted(&self, hit: &Hit, w: DVec3) -> Colour {
-        match self.sources.panel_face(hit.primitive) {
-            Some((panel, _)) => panel.luminance(w),
-            None => self.surface(hit.primitive).emission,
+        if let Some((panel, _)) = self.sources.panel_face(hit.primitive) {
+            return panel.luminance(w);
         }
+        let mean = self.surface(hit.primitive).emission;
+        if mean.is_black() || !self.textures.varies(self.surface_of[hit.primitive as usize], hit.primitive) {
+            return mean;
+        }
+        // Of triangles without light in their part of the texture there is no emitter.
+        self.sources
+            .emitter(None, hit.primitive)
+            .map_or(Colour::BLACK, |(emitter, _)| emitter.luminance_at(hit.position))
     }
 
     /// Where daylight enters; none without daylight.
@@ -309,6 +340,7 @@ impl Scene {
         let surfaces = self.surfaces.len() * size_of::<Surface>() + 4 * self.surface_of.len();
         self.geometry.bytes()
             + self.nodes.bytes()
+            + self.textures.bytes()
             + (surfaces + self.sources.emitters.len() * (size_of::<Emitter>() + 8)) as u64
     }
 }
@@ -362,13 +394,21 @@ fn planes(job: &Job, offset: DVec3) -> Vec<Plane> {
 }
 
 /// The area lights: one for each triangle of an emissive surface.
-fn emitters(geometry: &Geometry, surfaces: &[Surface], surface_of: &[u32]) -> Vec<Emitter> {
-    let lit = |primitive: &usize| !surfaces[surface_of[*primitive] as usize].emission.is_black();
-    let emitter = |primitive: usize| {
-        let surface = &surfaces[surface_of[primitive] as usize];
-        Emitter::of_triangle(geometry, primitive as u32, surface.emission, surface.double_sided)
+fn emitters(geometry: &Geometry, surfaces: &[Surface], surface_of: &[u32], textures: &Textures) -> Vec<Emitter> {
+    let surface = |primitive: u32| &surfaces[surface_of[primitive as usize] as usize];
+    let lit = |primitive: &u32| !surface(*primitive).emission.is_black();
+    let varying = |primitive: &u32| textures.varies(surface_of[*primitive as usize], *primitive);
+    let all: Vec<u32> = (0..geometry.triangles() as u32).filter(lit).collect();
+    let glowing = all.iter().filter(|primitive| varying(primitive)).count();
+    let emitter = |primitive: u32| {
+        let Surface { emission, double_sided, .. } = *surface(primitive);
+        let emitter = Emitter::of_triangle(geometry, primitive, emission, double_sided);
+        match textures.glow(surface_of[primitive as usize], primitive) {
+            Some(glow) => emitter.glowing(glow, glowing),
+            None => emitter,
+        }
     };
-    (0..geometry.triangles() as usize).filter(lit).map(emitter).collect()
+    all.into_iter().map(emitter).collect()
 }
 
 /// The star-shaped objects that emit: the last of all surfaces.

@@ -44,6 +44,7 @@ impl Model {
         self.triangles.retain(|_| keep());
         self.surface_of.retain(|_| keep());
         self.nodes.of_triangle.retain(|_| keep());
+        self.textures.charts.retain(&kept);
         self.drop_unused_vertices();
     }
 

@@ -11,6 +11,7 @@ use super::groups::Groups;
 use super::light::Light;
 use super::panel::Panel;
 use super::sky::Sky;
+use super::textures::{Glow, Place};
 use crate::geometry::Geometry;
 use crate::math::{DVec3, PI, to_world};
 use crate::photometry::Colour;
@@ -30,10 +31,12 @@ pub struct Emitter {
     pub normal: DVec3,
     /// Area \[m2\].
     pub area: f64,
-    /// Emitted luminance \[cd/m2\].
+    /// Emitted luminance \[cd/m2\]; where it varies about its mean, by which the emitter is chosen.
     pub luminance: Colour,
     /// True when the back emits as well.
     pub double_sided: bool,
+    /// How it varies.
+    glow: Option<Box<Glow>>,
 }
 
 impl Emitter {
@@ -42,11 +45,30 @@ impl Emitter {
         let [a, b, c] = geometry.triangle(primitive);
         let across = (b - a).cross(c - a);
         let (normal, area) = (across.normalize_or_zero(), 0.5 * across.length());
-        Emitter { primitive, corners: [a, b, c], normal, area, luminance, double_sided }
+        Emitter { primitive, corners: [a, b, c], normal, area, luminance, double_sided, glow: None }
     }
 
+    /// The same, one of `count`, with a luminance that varies.
+    pub(super) fn glowing(self, glow: Glow, count: usize) -> Self {
+        Emitter { luminance: glow.mean(count), glow: Some(Box::new(glow)), ..self }
+    }
+
+    /// Luminance emitted at `position` \[cd/m2\].
+    pub fn luminance_at(&self, position: DVec3) -> Colour {
+        match &self.glow {
+            None => self.luminance,
+            Some(glow) => glow.at(Place::new(self.primitive, self.corners, position).weights),
+        }
+    }
+
+    /// Flux by which it is chosen \[lm\].
     pub(super) fn flux(&self) -> Colour {
-        self.luminance * (PI * self.area * if self.double_sided { 2.0 } else { 1.0 })
+        self.flux_of(self.luminance)
+    }
+
+    /// Flux with `luminance` all over \[lm\].
+    fn flux_of(&self, luminance: Colour) -> Colour {
+        luminance * (PI * self.area * if self.double_sided { 2.0 } else { 1.0 })
     }
 
     /// Square of the length of its longest edge \[m2\].
@@ -305,7 +327,7 @@ impl Sources {
                 let light = &self.lights[number];
                 (light.start(self.covered, rng.uniform2()), light.flux(self.covered.1))
             }
-            1 => (emit_triangle(&self.emitters[number], geometry, rng), self.emitters[number].flux()),
+            1 => return self.emit_triangle(&self.emitters[number], geometry, rng),
             2 => (self.panels[number].emit(geometry, rng), self.panels[number].luminaire.flux()),
             4 => {
                 let outside = self.environment.as_ref().expect("ways to draw its light belong to an environment");
@@ -316,12 +338,14 @@ impl Sources {
         // flux over the probability of the choice: the colour of the source, the luminous flux of all.
         Emission { origin, direction, weight: flux * (started / flux.luminance()), emphasis: 1.0 }
     }
-}
 
-fn emit_triangle(emitter: &Emitter, geometry: &Geometry, rng: &mut Generator) -> (DVec3, DVec3) {
-    let point = emitter.point(rng.uniform2());
-    let back = emitter.double_sided && rng.uniform() < 0.5;
-    let normal = if back { -emitter.normal } else { emitter.normal };
-    let direction = to_world(normal, cosine_hemisphere(rng.uniform2()));
-    (geometry.lift(point, normal), direction)
+    /// Starts a history at a point of `emitter`, uniform in area, with the luminance of that point.
+    fn emit_triangle(&self, emitter: &Emitter, geometry: &Geometry, rng: &mut Generator) -> Emission {
+        let point = emitter.point(rng.uniform2());
+        let back = emitter.double_sided && rng.uniform() < 0.5;
+        let normal = if back { -emitter.normal } else { emitter.normal };
+        let direction = to_world(normal, cosine_hemisphere(rng.uniform2()));
+        let weight = emitter.flux_of(emitter.luminance_at(point)) * (self.started() / emitter.flux().luminance());
+        Emission { origin: geometry.lift(point, normal), direction, weight, emphasis: 1.0 }
+    }
 }

@@ -4,6 +4,7 @@
 //! reflection and no delta scatterer is counted. What is not let through is *met*: the surface's law of reflection has it, and
 //! its albedo is a share of what is met.
 
+use super::textures::{Coverage, Place};
 use super::{Delta, Reflectance, Scattered, Scene, Surface};
 use crate::geometry::{Hit, Ray};
 use crate::math::{DVec3, Vec3};
@@ -23,13 +24,13 @@ pub enum Meeting {
 }
 
 impl Surface {
-    /// True when it lets light through straight on, at least somewhere.
+    /// True when its law lets light through straight on.
     pub fn is_veil(&self) -> bool {
         matches!(self.reflectance, Reflectance::Delta(Delta::Pane(_)))
     }
 
-    /// The share of light that goes straight on through it; `primitive` and `position` tell where, `cosine` is that of incidence, above 0.
-    fn transmittance(&self, _primitive: u32, _position: DVec3, cosine: f64) -> Colour {
+    /// The share of light that goes straight on through it, `cosine` is that of incidence, above 0.
+    fn transmittance(&self, cosine: f64) -> Colour {
         match &self.reflectance {
             Reflectance::Delta(Delta::Pane(pane)) => pane.transmittance(cosine),
             _ => Colour::BLACK,
@@ -40,7 +41,20 @@ impl Surface {
 impl Scene {
     /// The share of light that goes straight on through the surface `primitive` \[1\].
     pub fn let_through(&self, primitive: u32, position: DVec3, cosine: f64) -> Colour {
-        self.surface(primitive).transmittance(primitive, position, cosine)
+        let surface = self.surface_of[primitive as usize];
+        match self.textures.of(surface, primitive) {
+            Some(textured) if textured.coverage != Coverage::Whole => {
+                let place = Place::new(primitive, self.geometry.triangle(primitive), position);
+                Colour::grey(1.0 - self.textures.covered(textured, place))
+            }
+            _ => self.surfaces[surface as usize].transmittance(cosine),
+        }
+    }
+
+    /// True where light may go straight on through the surface `primitive`.
+    fn is_veil(&self, primitive: u32) -> bool {
+        let surface = self.surface_of[primitive as usize];
+        self.surfaces[surface as usize].is_veil() || self.textures.is_veil(surface, primitive)
     }
 
     /// The share of light that gets straight from one lifted point to another: 0 where a surface blocks, 1 where nothing is between.
@@ -63,7 +77,7 @@ impl Scene {
             let Some(hit) = self.geometry.closest_hit_within(&ray, limit - gone) else { return (None, share) };
             let here = Hit { distance: gone + hit.distance, ..hit };
             let cosine = -ray.direction.dot(hit.normal);
-            if !self.surface(hit.primitive).is_veil() {
+            if !self.is_veil(hit.primitive) {
                 return (Some(here), share);
             }
             let through = self.let_through(hit.primitive, hit.position, cosine);
@@ -84,9 +98,9 @@ impl Scene {
 
     /// Draws how light along `direction` goes on at `hit`, where it is met; inside glass it has become less on its way there.
     pub fn scatter(&self, hit: &Hit, direction: DVec3, rng: &mut Generator) -> Option<Scattered> {
-        let reflectance = &self.surface(hit.primitive).reflectance;
+        let reflectance = self.reflectance(hit.primitive, hit.position);
         let scattered = reflectance.sample_from(hit.front, hit.normal, direction, rng)?;
-        match reflectance {
+        match &*reflectance {
             Reflectance::Delta(Delta::Glass(glass)) if !hit.front => {
                 Some(Scattered { factor: scattered.factor * glass.left(hit.distance), ..scattered })
             }
@@ -114,17 +128,17 @@ impl Scene {
     /// Chooses whether light along `direction` goes on behind `hit` or is met there; without a choice no number is drawn. With `mirrors`
     /// what a pane mirrors is wanted; without it is not followed, and all that gets through goes on.
     pub fn meet(&self, hit: &Hit, direction: DVec3, mirrors: bool, rng: &mut Generator) -> Meeting {
-        let surface = self.surface(hit.primitive);
-        if !surface.is_veil() {
+        if !self.is_veil(hit.primitive) {
             return Meeting::Met(Colour::WHITE);
         }
         let cosine = -direction.dot(hit.normal);
         let through = self.let_through(hit.primitive, hit.position, cosine);
         let rest = Colour::WHITE + through * -1.0;
         // What is met counts as much as it reflects; where connections start from it, all of it.
-        let kept = match (surface.reflectance.is_black(), mirrors) {
+        let reflectance = self.reflectance(hit.primitive, hit.position);
+        let kept = match (reflectance.is_black(), mirrors) {
             (false, _) => rest.luminance(),
-            (true, true) => (rest * surface.reflectance.albedo(cosine)).luminance(),
+            (true, true) => (rest * reflectance.albedo(cosine)).luminance(),
             (true, false) => 0.0,
         };
         let passed = through.luminance();

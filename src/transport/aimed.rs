@@ -24,7 +24,7 @@ pub fn is_aimed(scene: &Scene, emphasis: f64) -> bool {
 
 /// Draws the direction after a reflection at `hit`, and says whether an opening lies there; `None` where nothing was reflected.
 pub fn scatter(scene: &Scene, hit: &Hit, w_in: DVec3, rng: &mut Generator) -> Option<(Scattered, bool)> {
-    let reflectance = &scene.surface(hit.primitive).reflectance;
+    let reflectance = scene.reflectance(hit.primitive, hit.position);
     if reflectance.has_delta() || reflectance.sides().is_some() {
         return scene.scatter(hit, w_in, rng).map(|scattered| (scattered, false));
     }

@@ -216,10 +216,10 @@ impl Tile {
         // No continuation finds what came from a delta scatterer: all of it is connected.
         let bound = if vertex.after_delta { f32::INFINITY } else { bound };
         let carrying = Carrying { factors: &factors, seen: &seen, bound, through };
-        self.spread::<I, C>(scene, vertex, &carrying, &mut sums.light);
+        self.spread::<I, C>(vertex, &carrying, &mut sums.light);
         if vertex.after_delta {
             sums.has_mirrored = true;
-            self.spread::<I, C>(scene, vertex, &carrying, &mut sums.mirrored);
+            self.spread::<I, C>(vertex, &carrying, &mut sums.mirrored);
         }
     }
 
@@ -243,15 +243,9 @@ impl Tile {
     /// Adds to `sums` what `vertex` sends each receiver seen, over its geometric factor up to the bound over the peaks of both
     /// laws.
     #[inline(always)]
-    fn spread<I: Isa, const C: usize>(
-        &self,
-        scene: &Scene,
-        vertex: &Connector,
-        carrying: &Carrying<C>,
-        sums: &mut [Column; C],
-    ) {
+    fn spread<I: Isa, const C: usize>(&self, vertex: &Connector, carrying: &Carrying<C>, sums: &mut [Column; C]) {
         if vertex.glossy.is_some() || self.varying.is_some() {
-            return self.spread_varying::<I, C>(scene, vertex, carrying, sums);
+            return self.spread_varying::<I, C>(vertex, carrying, sums);
         }
         let Carrying { factors, seen, bound, through } = *carrying;
         let most = I::Sixteen::splat(bound);
@@ -272,7 +266,6 @@ impl Tile {
     #[inline(always)]
     fn spread_varying<I: Isa, const C: usize>(
         &self,
-        scene: &Scene,
         vertex: &Connector,
         carrying: &Carrying<C>,
         sums: &mut [Column; C],
@@ -287,11 +280,11 @@ impl Tile {
             let w = sub(&lanes::<I>(&self.position, bundle), &p);
             let length = dot(&w, &w).max(I::Sixteen::splat(NOWHERE)).sqrt();
             let w = scale(&w, I::Sixteen::splat(1.0).div(length));
-            let (mut value, mut peak) = sent::<I, C>(scene, vertex, &n, &w);
+            let (mut value, mut peak) = sent::<I, C>(vertex, &n, &w);
             if let Some(varying) = &self.varying {
                 let from = scale(&w, I::Sixteen::splat(-1.0));
                 let normal = lanes::<I>(&self.normal, bundle);
-                let (response, of_receiver) = varying.respond::<I, C>(scene, bundle, here, &normal, &from);
+                let (response, of_receiver) = varying.respond::<I, C>(bundle, here, &normal, &from);
                 for c in 0..C {
                     value[c] = value[c].mul(response[c]);
                 }
@@ -324,7 +317,6 @@ struct Carrying<'a, const C: usize> {
 /// W f of `vertex` with the normal `n` along the unit vectors `w` \[lm/sr\], and the peak of f.
 #[inline(always)]
 fn sent<I: Isa, const C: usize>(
-    scene: &Scene,
     vertex: &Connector,
     n: &Triple<I::Sixteen>,
     w: &Triple<I::Sixteen>,
@@ -335,14 +327,12 @@ fn sent<I: Isa, const C: usize>(
         sent[c] = I::Sixteen::splat(vertex.intensity[c]);
     }
     let Some(glossy) = &vertex.glossy else { return (sent, one) };
-    let reflectance = &scene.surface(glossy.primitive).reflectance;
-    let Some(law) = reflectance.lanes() else { return (sent, one) };
     let mut through = [one; C];
     for c in 0..C {
         through[c] = I::Sixteen::splat(glossy.through[c]);
     }
-    let f = law.evaluate::<I::Sixteen, C>(n, (&splat(glossy.from), &through), w);
-    let peak = if reflectance.is_peaked() { weights_over_tolerated(&f) } else { one };
+    let f = glossy.law.evaluate::<I::Sixteen, C>(n, (&splat(glossy.from), &through), w);
+    let peak = if glossy.is_peaked { weights_over_tolerated(&f) } else { one };
     for c in 0..C {
         sent[c] = f[c].mul(I::Sixteen::splat(glossy.weight[c]));
     }

@@ -3,11 +3,11 @@
 use super::trajectory::Vertex;
 use crate::math::{DVec3, PI, Vec3};
 use crate::photometry::Colour;
-use crate::scene::Scene;
+use crate::scene::{LawInLanes, Scene};
 use std::ops::Range;
 
 /// A vertex as the kernel wants it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Connector {
     pub(super) position: Vec3,
     pub(super) lifted: Vec3,
@@ -18,17 +18,19 @@ pub(super) struct Connector {
     pub(super) order: u32,
     /// True where the bound does not apply.
     pub(super) after_delta: bool,
-    /// Where the law of reflection depends on direction.
-    pub(super) glossy: Option<GlossyConnector>,
+    /// Where the law of reflection depends on direction; apart, so that matt vertices stay small.
+    pub(super) glossy: Option<Box<GlossyConnector>>,
     /// Number of the emitter of which this is a point and no vertex.
     pub(super) emitter: Option<u32>,
 }
 
 /// What a vertex of a law that depends on direction has besides.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct GlossyConnector {
-    /// The primitive that has the law.
-    pub(super) primitive: u32,
+    /// The law.
+    pub(super) law: LawInLanes,
+    /// Whether connections from it are spiky.
+    pub(super) is_peaked: bool,
     /// Unit vector to where the light came from.
     pub(super) from: Vec3,
     /// What gets through the specular part from there.
@@ -103,7 +105,7 @@ impl Connectors {
 }
 
 fn connector(scene: &Scene, v: &Vertex) -> Connector {
-    let reflectance = &scene.surface(v.primitive).reflectance;
+    let reflectance = scene.reflectance(v.primitive, v.position);
     let lambert = reflectance.lambert().or(reflectance.sides().map(|(same_side, _)| same_side));
     let narrow = |c: Colour| c.0.map(|c| c as f32);
     Connector {
@@ -113,11 +115,14 @@ fn connector(scene: &Scene, v: &Vertex) -> Connector {
         intensity: narrow(v.weight * lambert.unwrap_or(Colour::BLACK) / PI),
         order: v.order,
         after_delta: v.after_delta,
-        glossy: lambert.is_none().then(|| GlossyConnector {
-            primitive: v.primitive,
-            from: -v.w_in.as_vec3(),
-            through: narrow(reflectance.through(-v.w_in.dot(v.normal))),
-            weight: narrow(v.weight),
+        glossy: reflectance.lanes().map(|law| {
+            Box::new(GlossyConnector {
+                law: law.clone(),
+                is_peaked: reflectance.is_peaked(),
+                from: -v.w_in.as_vec3(),
+                through: narrow(reflectance.through(-v.w_in.dot(v.normal))),
+                weight: narrow(v.weight),
+            })
         }),
         emitter: None,
     }

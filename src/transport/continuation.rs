@@ -101,13 +101,13 @@ struct Found {
 
 impl Found {
     fn is_matt(&self, scene: &Scene) -> bool {
-        scene.surface(self.hit.primitive).reflectance.lambert().is_some()
+        scene.reflectance(self.hit.primitive, self.hit.position).lambert().is_some()
     }
 
     /// The receiver of light that is reflected here and then counts with `weight`.
     fn receiver(self, scene: &Scene, weight: Colour) -> Receiver {
         let Found { hit, back, carried } = self;
-        let response = Response::reflectance(scene, (hit.primitive, hit.normal), back, weight, carried);
+        let response = Response::reflectance(scene, (hit.primitive, hit.position, hit.normal), back, weight, carried);
         Receiver { position: hit.position, normal: hit.normal, response }
     }
 }
@@ -129,7 +129,7 @@ fn step(scene: &Scene, at: &Receiver, bound: f64, rng: &mut Generator) -> Option
     // What a pane mirrors is carried by connections alone, as of every mirror.
     let (hit, share) = scene.met_from(first, direction, false, rng);
     let (hit, weight) = (hit.filter(|h| !scene.absorbs(h))?, weight * share);
-    let reflectance = &scene.surface(hit.primitive).reflectance;
+    let reflectance = scene.reflectance(hit.primitive, hit.position);
     if reflectance.is_black() {
         return None;
     }

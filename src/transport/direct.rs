@@ -163,7 +163,7 @@ fn sample_emitter(scene: &Scene, receiver: &Receiver, sight: &Sight, rng: &mut G
         return Colour::BLACK;
     }
     let both = sight.density(point) + density_of_response(scene, receiver, w_in);
-    sight.luminance(w_in) * through * (cosine / both) * receiver.response.to(scene, receiver.normal, w_in)
+    sight.luminance(point, w_in) * through * (cosine / both) * receiver.response.to(scene, receiver.normal, w_in)
 }
 
 /// One sample of the light that emitters send where the peaked response looks: those of which `seen` knows, from the hit and the
@@ -222,14 +222,14 @@ impl<'a> Sight<'a> {
         Sight { panel: Some(panel), ..self }
     }
 
-    /// Luminance of light with the propagation direction `w_in` \[cd/m2\].
-    fn luminance(&self, w_in: DVec3) -> Colour {
-        self.panel.map_or(self.emitter.luminance, |panel| panel.luminance(w_in))
+    /// Luminance of light from `point` with the propagation direction `w_in` \[cd/m2\].
+    fn luminance(&self, point: DVec3, w_in: DVec3) -> Colour {
+        self.panel.map_or_else(|| self.emitter.luminance_at(point), |panel| panel.luminance(w_in))
     }
 
     /// Luminance of light with the propagation direction `w_in` from where a ray met it, and the density with which that is drawn.
     fn of_hit(&self, hit: &Hit, w_in: DVec3) -> (Colour, f64) {
-        (self.luminance(w_in), self.density(hit.position))
+        (self.luminance(hit.position, w_in), self.density(hit.position))
     }
 
     /// A point of the emitter. The luminance of a luminaire grows without bound where it is seen edge-on and still shines: by area

@@ -58,6 +58,8 @@ pub enum Response {
     Reflectance {
         /// The surface seen.
         primitive: u32,
+        /// Where on it \[m\].
+        position: DVec3,
         /// l, from the receiver to the eye or the last mirror.
         to_eye: DVec3,
         /// What the mirrors on the way to the eye reflect, over the probability of having followed them.
@@ -71,16 +73,16 @@ pub enum Response {
 }
 
 impl Response {
-    /// Luminance of `primitive` with `normal` towards the eye, with the attenuation and the carried share given.
+    /// Luminance of `primitive` at `position` with `normal` towards the eye, with the attenuation and the carried share given.
     pub fn reflectance(
         scene: &Scene,
-        (primitive, normal): (u32, DVec3),
+        (primitive, position, normal): (u32, DVec3, DVec3),
         to_eye: DVec3,
         attenuation: Colour,
         carried: f64,
     ) -> Self {
-        let peaked = scene.surface(primitive).reflectance.is_peaked_at(to_eye.dot(normal));
-        Response::Reflectance { primitive, to_eye, attenuation, carried, peaked }
+        let peaked = scene.reflectance(primitive, position).is_peaked_at(to_eye.dot(normal));
+        Response::Reflectance { primitive, position, to_eye, attenuation, carried, peaked }
     }
 
     /// The response at a receiver with `normal` where it does not depend on the direction of arrival: of lux-meters, Lambert and opal
@@ -88,8 +90,8 @@ impl Response {
     pub fn constant(&self, scene: &Scene, normal: DVec3) -> Option<Colour> {
         match self {
             Response::Cosine => Some(Colour::WHITE),
-            Response::Reflectance { primitive, attenuation, carried, .. } => {
-                let rho = self.side(scene, normal).or(scene.surface(*primitive).reflectance.lambert())?;
+            Response::Reflectance { primitive, position, attenuation, carried, .. } => {
+                let rho = self.side(scene, normal).or_else(|| scene.reflectance(*primitive, *position).lambert())?;
                 Some(rho * *attenuation * (left(*carried, 1.0) / PI))
             }
         }
@@ -112,8 +114,8 @@ impl Response {
     pub fn with_peak(&self, scene: &Scene, normal: DVec3, w_in: DVec3) -> (Colour, f64) {
         match self {
             Response::Cosine => (Colour::WHITE, 1.0),
-            Response::Reflectance { primitive, to_eye, attenuation, carried, peaked } => {
-                let reflectance = &scene.surface(*primitive).reflectance;
+            Response::Reflectance { primitive, position, to_eye, attenuation, carried, peaked } => {
+                let reflectance = scene.reflectance(*primitive, *position);
                 let f = reflectance.evaluate(normal, w_in, *to_eye);
                 let peak = if *peaked { weight_over_tolerated(f) } else { 1.0 };
                 (f * *attenuation * left(*carried, reflectance.peak(f)), peak)
@@ -125,8 +127,8 @@ impl Response {
     pub fn as_if_matt(&self, scene: &Scene, normal: DVec3, w_in: DVec3) -> Colour {
         match self {
             Response::Cosine => Colour::WHITE,
-            Response::Reflectance { primitive, attenuation, .. } => {
-                scene.surface(*primitive).reflectance.albedo(-w_in.dot(normal)) * *attenuation / PI
+            Response::Reflectance { primitive, position, attenuation, .. } => {
+                scene.reflectance(*primitive, *position).albedo(-w_in.dot(normal)) * *attenuation / PI
             }
         }
     }
@@ -141,12 +143,12 @@ impl Response {
     pub fn sample(&self, scene: &Scene, normal: DVec3, rng: &mut Generator) -> Option<(DVec3, Colour)> {
         match self {
             Response::Cosine => Some((to_world(normal, cosine_hemisphere(rng.uniform2())), Colour::grey(PI))),
-            Response::Reflectance { primitive, to_eye, attenuation, carried, .. } => {
+            Response::Reflectance { primitive, position, to_eye, attenuation, carried, .. } => {
                 if let Some(colour) = self.side(scene, normal) {
                     let direction = to_world(normal, cosine_hemisphere(rng.uniform2()));
                     return Some((direction, colour * *attenuation * left(*carried, 1.0)));
                 }
-                let reflectance = &scene.surface(*primitive).reflectance;
+                let reflectance = scene.reflectance(*primitive, *position);
                 // Laws are reciprocal: light sent back from the eye leaves in the directions that the eye receives.
                 let scattered = reflectance.sample(normal, -*to_eye, rng).filter(|s| !s.delta)?;
                 let peak = match reflectance.is_peaked() {
@@ -162,8 +164,8 @@ impl Response {
     pub fn pdf(&self, scene: &Scene, normal: DVec3, w_in: DVec3) -> f64 {
         match self {
             Response::Cosine => (-w_in.dot(normal)).max(0.0) / PI,
-            Response::Reflectance { primitive, to_eye, .. } => {
-                scene.surface(*primitive).reflectance.pdf(normal, -*to_eye, -w_in)
+            Response::Reflectance { primitive, position, to_eye, .. } => {
+                scene.reflectance(*primitive, *position).pdf(normal, -*to_eye, -w_in)
             }
         }
     }
@@ -214,9 +216,9 @@ pub fn look_at(scene: &Scene, mut hit: Hit, mut direction: DVec3, rng: &mut Gene
         if scene.absorbs(&hit) {
             break;
         }
-        let surface = scene.surface(hit.primitive);
+        let reflectance = scene.reflectance(hit.primitive, hit.position);
         seen.emitted += attenuation * scene.emitted(&hit, -direction);
-        if matches!(surface.reflectance, Reflectance::Delta(Delta::Glass(_))) {
+        if matches!(*reflectance, Reflectance::Delta(Delta::Glass(_))) {
             let Some(scattered) = scene.scatter_eye_ray(&hit, direction, rng) else { break };
             (attenuation, direction) = (attenuation * scattered.factor, scattered.direction);
             match scene.geometry.closest_hit(&scene.leaving(&hit, &scattered)) {
@@ -229,8 +231,8 @@ pub fn look_at(scene: &Scene, mut hit: Hit, mut direction: DVec3, rng: &mut Gene
             continue;
         }
         let cosine = -direction.dot(hit.normal);
-        let mirror = surface.reflectance.delta_reflectance(cosine);
-        let follow = mirror.map_or(0.0, |f| follow_probability(&surface.reflectance, f, cosine));
+        let mirror = reflectance.delta_reflectance(cosine);
+        let follow = mirror.map_or(0.0, |f| follow_probability(&reflectance, f, cosine));
         // Without a choice no number is drawn.
         let stops = follow == 0.0 || (follow < 1.0 && rng.uniform() >= follow);
         if stops {
@@ -255,8 +257,8 @@ pub fn look_at(scene: &Scene, mut hit: Hit, mut direction: DVec3, rng: &mut Gene
 /// The receiver at `hit`, if the surface there reflects.
 fn receiver(scene: &Scene, hit: &Hit, direction: DVec3, attenuation: Colour) -> Option<Receiver> {
     let (primitive, to_eye) = (hit.primitive, -direction);
-    let response = Response::reflectance(scene, (primitive, hit.normal), to_eye, attenuation, 0.0);
-    let reflects = !scene.surface(hit.primitive).reflectance.is_black();
+    let response = Response::reflectance(scene, (primitive, hit.position, hit.normal), to_eye, attenuation, 0.0);
+    let reflects = !scene.reflectance(hit.primitive, hit.position).is_black();
     reflects.then_some(Receiver { position: hit.position, normal: hit.normal, response })
 }
 

@@ -62,17 +62,17 @@ pub fn path(scene: &Scene, transport: &Transport, receiver: &Receiver, rng: &mut
         if scene.absorbs(&hit) {
             break;
         }
-        let surface = scene.surface(hit.primitive);
+        let reflectance = scene.reflectance(hit.primitive, hit.position);
         let back = -ray.direction;
-        let response = |w_in| surface.reflectance.evaluate(hit.normal, w_in, back);
+        let response = |w_in| reflectance.evaluate(hit.normal, w_in, back);
         *emitted += weight * scene.emitted(&hit, back);
         found.reflected += weight * from_lights(scene, hit.position, hit.normal, response);
-        if surface.reflectance.sides().is_some() {
-            let transmitted = |w_in| surface.reflectance.evaluate(-hit.normal, w_in, back);
+        if reflectance.sides().is_some() {
+            let transmitted = |w_in| reflectance.evaluate(-hit.normal, w_in, back);
             found.reflected += weight * from_lights(scene, hit.position, -hit.normal, transmitted);
         }
-        if surface.reflectance.is_peaked_at(back.dot(hit.normal)) {
-            let matt = |w_in: DVec3| surface.reflectance.albedo(-w_in.dot(hit.normal)) / PI;
+        if reflectance.is_peaked_at(back.dot(hit.normal)) {
+            let matt = |w_in: DVec3| reflectance.albedo(-w_in.dot(hit.normal)) / PI;
             found.caustic += weight * from_lights(scene, hit.position, hit.normal, matt);
         }
         let Some(next) = scene.scatter_eye_ray(&hit, ray.direction, rng) else { break };
@@ -91,8 +91,8 @@ pub fn path(scene: &Scene, transport: &Transport, receiver: &Receiver, rng: &mut
 pub fn lights_at(scene: &Scene, receiver: &Receiver) -> Colour {
     from_lights(scene, receiver.position, receiver.normal, |w_in| match receiver.response {
         Response::Cosine => Colour::WHITE,
-        Response::Reflectance { primitive, to_eye, attenuation, .. } => {
-            scene.surface(primitive).reflectance.evaluate(receiver.normal, w_in, to_eye) * attenuation
+        Response::Reflectance { primitive, position, to_eye, attenuation, .. } => {
+            scene.reflectance(primitive, position).evaluate(receiver.normal, w_in, to_eye) * attenuation
         }
     })
 }
@@ -102,13 +102,13 @@ fn leave(scene: &Scene, receiver: &Receiver, rng: &mut Generator) -> Option<(Ray
     let normal = receiver.normal;
     let (direction, weight) = match receiver.response {
         Response::Cosine => (to_world(normal, cosine_hemisphere(rng.uniform2())), Colour::grey(PI)),
-        Response::Reflectance { primitive, to_eye, attenuation, .. } => {
+        Response::Reflectance { primitive, position, to_eye, attenuation, .. } => {
             let drawn = match receiver.response.side(scene, normal) {
                 Some(colour) => {
                     let direction = to_world(normal, cosine_hemisphere(rng.uniform2()));
                     Scattered { direction, factor: colour, delta: false, transmitted: false }
                 }
-                None => scene.surface(primitive).reflectance.sample(normal, -to_eye, rng)?,
+                None => scene.reflectance(primitive, position).sample(normal, -to_eye, rng)?,
             };
             (!drawn.delta).then_some((drawn.direction, attenuation * drawn.factor))?
         }

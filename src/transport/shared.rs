@@ -74,7 +74,7 @@ impl LitPoints {
         let (number, probability) = scene.sources.choose_emitter(among, choice);
         let emitter = &scene.sources.emitters[number];
         let position = emitter.point(DVec2::new(x, y));
-        let intensity = emitter.luminance * (emitter.area / (probability * f64::from(self.count)));
+        let intensity = emitter.luminance_at(position) * (emitter.area / (probability * f64::from(self.count)));
         let lit = move |normal: DVec3| LitPoint { position, normal, intensity, emitter: number as u32 };
         let sides = if emitter.double_sided { 2 } else { 1 };
         [emitter.normal, -emitter.normal].into_iter().take(sides).map(lit)

@@ -122,7 +122,7 @@ pub fn trace(scene: &Scene, transport: &Transport, rng: &mut Generator, record: 
             flux.absorbed += weight.luminance();
             return flux;
         }
-        let reflectance = &scene.surface(hit.primitive).reflectance;
+        let reflectance = scene.reflectance(hit.primitive, hit.position);
         if !reflectance.is_black() {
             let (position, normal, w_in) = (hit.position, hit.normal, ray.direction);
             record.vertex(Vertex {

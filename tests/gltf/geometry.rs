@@ -168,7 +168,7 @@ fn what_is_ignored_is_listed() {
     builder.json["animations"] = json!([{}]);
     let primitive = &mut builder.json["meshes"][0]["primitives"][0];
     primitive["targets"] = json!([{ "POSITION": 0 }]);
-    for name in ["NORMAL", "COLOR_0"] {
+    for name in ["NORMAL", "COLOR_1"] {
         primitive["attributes"][name] = json!(0);
     }
     builder.set("/nodes/1/skin", json!(0));
@@ -181,11 +181,104 @@ fn what_is_ignored_is_listed() {
         "animations",
         "morph targets",
         "interpolated normals are not used",
-        "vertex colours",
+        "vertex colours beyond COLOR_0",
         "nodes[1]: its skin",
         "points and lines",
     ] {
         assert!(warns(&model, text), "{text} is not in {:?}", model.warnings);
     }
     assert!(!warns(&model, "KHR_lights_punctual"));
+}
+
+/// Bytes of floats.
+fn floats(values: &[f32]) -> Vec<u8> {
+    values.iter().flat_map(|v| v.to_le_bytes()).collect()
+}
+
+#[test]
+fn instances_stand_where_their_own_nodes_would() {
+    let mut nodes = Builder::new();
+    let mesh = nodes.mesh(&SQUARE, Some(&CORNERS));
+    nodes.node(json!({ "children": [1, 2], "translation": [0.0, 5.0, 0.0], "scale": [2.0, 1.0, 1.0] }));
+    let half = std::f32::consts::FRAC_1_SQRT_2;
+    nodes.node(json!({ "mesh": mesh, "translation": [1.0, 2.0, 3.0], "rotation": [half, 0.0, 0.0, half], "scale": [1.0, 1.0, 4.0] }));
+    nodes.node(json!({ "mesh": mesh, "translation": [-4.0, 0.5, 0.0], "scale": [-1.0, 1.0, 1.0] }));
+    nodes.json["scenes"] = json!([{ "nodes": [0] }]);
+
+    let mut instanced = Builder::new();
+    let mesh = instanced.mesh(&SQUARE, Some(&CORNERS));
+    let translation = instanced.accessor(&floats(&[1.0, 2.0, 3.0, -4.0, 0.5, 0.0]), 5126, 2, "VEC3");
+    let rotation = instanced.accessor(&floats(&[half, 0.0, 0.0, half, 0.0, 0.0, 0.0, 1.0]), 5126, 2, "VEC4");
+    let scale = instanced.accessor(&floats(&[1.0, 1.0, 4.0, -1.0, 1.0, 1.0]), 5126, 2, "VEC3");
+    let attributes = json!({ "TRANSLATION": translation, "ROTATION": rotation, "SCALE": scale });
+    let extensions = json!({ "EXT_mesh_gpu_instancing": { "attributes": attributes } });
+    instanced.node(
+        json!({ "mesh": mesh, "translation": [0.0, 5.0, 0.0], "scale": [2.0, 1.0, 1.0], "extensions": extensions }),
+    );
+    instanced.json["extensionsRequired"] = json!(["EXT_mesh_gpu_instancing"]);
+
+    let (one, other) = (good(&nodes), good(&instanced));
+    assert_eq!(one.triangles.len(), 4);
+    assert_eq!((&one.positions, &one.triangles), (&other.positions, &other.triangles));
+}
+
+#[test]
+fn instances_that_do_not_fit_are_refused() {
+    let with = |attributes: &dyn Fn(&mut Builder) -> serde_json::Value| {
+        let mut builder = Builder::new();
+        let mesh = builder.mesh(&SQUARE, Some(&CORNERS));
+        let attributes = attributes(&mut builder);
+        let extensions = json!({ "EXT_mesh_gpu_instancing": { "attributes": attributes } });
+        builder.node(json!({ "mesh": mesh, "extensions": extensions }));
+        crate::refusal(crate::load(&builder.glb()))
+    };
+    let (field, ..) = with(&|_| json!({}));
+    assert_eq!(field, "nodes[0].extensions.EXT_mesh_gpu_instancing.attributes");
+    let (_, value, _) = with(&|b| {
+        let one = b.accessor(&floats(&[0.0; 3]), 5126, 1, "VEC3");
+        let two = b.accessor(&floats(&[1.0; 6]), 5126, 2, "VEC3");
+        json!({ "TRANSLATION": one, "SCALE": two })
+    });
+    assert_eq!(value, "1 and 2 instances");
+    let (field, ..) = with(&|b| json!({ "ROTATION": b.accessor(&floats(&[0.0; 4]), 5126, 1, "VEC4") }));
+    assert!(field.ends_with("ROTATION, element 0"), "{field}");
+    // Twelve bytes may claim no more instances than they hold, and no more of a mesh than a scene may have.
+    let (field, ..) = with(&|b| json!({ "TRANSLATION": b.accessor(&floats(&[0.0; 3]), 5126, 1 << 30, "VEC3") }));
+    assert!(field.ends_with(".count"), "{field}");
+}
+
+#[test]
+fn quantized_positions_are_those_that_they_stand_for() {
+    let plain = {
+        let mut builder = Builder::new();
+        let mesh = builder.mesh(&SQUARE, Some(&CORNERS));
+        builder.node(json!({ "mesh": mesh }));
+        good(&builder)
+    };
+    // Signed 16-bit normalized, each on a multiple of four bytes; and unsigned bytes as they are, which the node scales back.
+    for (component, normalized, full, stride) in [(5122, true, 32767.0, 8), (5121, false, 200.0, 4)] {
+        let mut builder = Builder::new();
+        let mesh = builder.mesh(&SQUARE, Some(&CORNERS));
+        let mut bytes = Vec::new();
+        for corner in SQUARE {
+            let start = bytes.len();
+            for x in corner.map(|x| f64::from(x) * full) {
+                match component {
+                    5122 => bytes.extend((x as i16).to_le_bytes()),
+                    _ => bytes.push(x as u8),
+                }
+            }
+            bytes.resize(start + stride, 0);
+        }
+        let accessor = builder.accessor(&bytes, component, 4, "VEC3");
+        builder.json["accessors"][accessor]["normalized"] = json!(normalized);
+        let view = builder.json["accessors"][accessor]["bufferView"].as_u64().unwrap() as usize;
+        builder.json["bufferViews"][view]["byteStride"] = json!(stride);
+        builder.json["meshes"][mesh]["primitives"][0]["attributes"]["POSITION"] = json!(accessor);
+        builder.json["extensionsRequired"] = json!(["KHR_mesh_quantization"]);
+        let scale = if normalized { 1.0 } else { 1.0 / full };
+        builder.node(json!({ "mesh": mesh, "scale": [scale, scale, scale] }));
+        let quantized = good(&builder);
+        assert_eq!((&plain.positions, &plain.triangles), (&quantized.positions, &quantized.triangles));
+    }
 }

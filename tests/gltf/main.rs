@@ -5,9 +5,11 @@ mod gltf_builder;
 
 mod bad;
 mod damage;
+mod foreign;
 mod geometry;
 mod lights_and_cameras;
 mod materials;
+mod textures;
 
 use gltf_builder::Builder;
 use lampyris::error::{Error, Result};

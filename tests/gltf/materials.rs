@@ -1,4 +1,4 @@
-//! Factors, emission, textures by their mean.
+//! Factors, emission, the means of textures that are not laid out.
 
 use serde_json::{Value, json};
 
@@ -90,12 +90,11 @@ fn a_mesh_without_material_is_white_metal_with_a_warning() {
 }
 
 #[test]
-fn alpha_normal_and_occlusion_are_ignored_with_warnings() {
+fn normal_and_occlusion_textures_are_ignored_with_warnings() {
     let texture = json!({ "index": 9 });
-    let material =
-        json!({ "name": "leaf", "alphaMode": "BLEND", "normalTexture": texture, "occlusionTexture": texture });
+    let material = json!({ "name": "leaf", "normalTexture": texture, "occlusionTexture": texture });
     let model = good(&square(material));
-    for text in ["alphaMode BLEND", "normalTexture is ignored", "occlusionTexture is ignored"] {
+    for text in ["normalTexture is ignored", "occlusionTexture is ignored"] {
         assert!(warns(&model, text), "{text}");
     }
 }
@@ -106,7 +105,7 @@ fn a_colour_texture_counts_by_the_mean_of_its_linear_values() {
     let model = good(&with_image(square(textured()), &image));
     let mean = |a, b| (linear(a) + linear(b)) / 2.0;
     assert_close(rho(&model), [0.5 * mean(255, 0), mean(128, 64), mean(0, 200)]);
-    assert!(warns(&model, "material `wall`: baseColorTexture `photo` is replaced by its mean"));
+    assert!(warns(&model, "meshes[0] has no TEXCOORD_0: the textures of material `wall` count by their means"));
 }
 
 #[test]
@@ -152,7 +151,6 @@ fn emissive_texture_is_a_colour_and_one_image_serves_twice() {
     let image = png(1, png::ColorType::Rgb, png::BitDepth::Eight, &[10, 100, 250]);
     let model = good(&with_image(square(material), &image));
     assert_close(model.surfaces[0].emission, [linear(10), linear(100), linear(250)]);
-    assert!(warns(&model, "emissiveTexture `photo`"));
 }
 
 #[test]
@@ -222,4 +220,39 @@ fn what_transmits_is_glass() {
 fn refused(builder: &Builder, word: &str) {
     let (field, ..) = refusal(load(&builder.glb()));
     assert!(field.contains(word), "{field}");
+}
+
+#[test]
+fn ior_and_specular_change_the_outer_surface() {
+    let material = |extensions: Value| {
+        let factors = json!({ "metallicFactor": 0.0, "roughnessFactor": 0.0, "baseColorFactor": [0.5, 0.5, 0.5, 1.0] });
+        json!({ "pbrMetallicRoughness": factors, "extensions": extensions })
+    };
+    let f0 = |extensions: Value| {
+        let model = good(&square(material(extensions)));
+        let mirror = model.surfaces[0].reflectance.delta_reflectance(1.0).expect("a mirror");
+        mirror.0.map(|c| (c * 1e9).round() / 1e9)
+    };
+    let ior = |ior: f64| json!({ "KHR_materials_ior": { "ior": ior } });
+    assert_eq!(
+        (f0(json!({})), f0(ior(1.5)), f0(json!({ "KHR_materials_ior": {} }))),
+        ([0.04; 3], [0.04; 3], [0.04; 3])
+    );
+    assert_eq!((f0(ior(3.0)), f0(ior(0.0))), ([0.25; 3], [1.0; 3]));
+    let specular = |more: Value| json!({ "KHR_materials_ior": { "ior": 3.0 }, "KHR_materials_specular": more });
+    assert_eq!(f0(specular(json!({ "specularFactor": 0.5 }))), [0.125; 3]);
+    // The colour may take it to one, and the factor counts after that.
+    assert_eq!(
+        f0(specular(json!({ "specularFactor": 0.5, "specularColorFactor": [8.0, 1.0, 0.0] }))),
+        [0.5, 0.125, 0.0]
+    );
+    let none = good(&square(material(json!({ "KHR_materials_specular": { "specularFactor": 0.0 } }))));
+    assert_eq!(rho(&none), Colour([0.5; 3]));
+    for (extension, field) in [
+        (ior(0.5), "KHR_materials_ior.ior"),
+        (json!({ "KHR_materials_specular": { "specularFactor": 1.5 } }), "KHR_materials_specular.specularFactor"),
+    ] {
+        let (refused, ..) = crate::refusal(crate::load(&square(material(extension)).glb()));
+        assert!(refused.ends_with(field), "{refused}");
+    }
 }

@@ -8,7 +8,7 @@ mod sampling;
 use lampyris::math::{DVec3, PI};
 use lampyris::photometry::Colour;
 use lampyris::random::{Domain, Generator, Stream, sphere};
-use lampyris::scene::Reflectance;
+use lampyris::scene::{Dielectric, Reflectance};
 use quadrature::Incidence;
 
 /// Widths of the lobe under test; 0.0011 is the narrowest that is not a mirror.
@@ -63,6 +63,50 @@ fn never_reflects_more_than_it_receives_and_knows_how_much() {
         }
     }
     println!("largest albedo {most}, largest error of the table {error:e}");
+}
+
+/// The outer surfaces of KHR_materials_ior and KHR_materials_specular: glass of index 2, a coloured one, a weak one, none.
+const DIELECTRICS: [Dielectric; 4] = [
+    Dielectric { f0: Colour::grey(1.0 / 9.0), f90: 1.0 },
+    Dielectric { f0: Colour([0.3, 0.05, 0.0]), f90: 1.0 },
+    Dielectric { f0: Colour::grey(0.02), f90: 0.5 },
+    Dielectric { f0: Colour::BLACK, f90: 0.0 },
+];
+
+#[test]
+fn other_dielectrics_conserve_energy_and_are_reciprocal_bit_for_bit() {
+    let mut rng = generator(5);
+    for (i, dielectric) in DIELECTRICS.into_iter().enumerate() {
+        for (metallic, alpha) in [(0.0, 0.1), (0.3, 0.01), (0.0, 0.5), (0.5, MIRROR)] {
+            let law = Reflectance::layered(BASE, metallic, f64::sqrt(alpha), dielectric);
+            for mu in [0.02, 0.1, 0.37, 0.83, 1.0] {
+                let integral = integrated_albedo(&law, &Incidence::new(DVec3::Z, mu, alpha));
+                let delta = law.delta_reflectance(mu).unwrap_or(Colour::BLACK);
+                let difference = largest_difference(integral + delta, law.albedo(mu));
+                assert!(law.albedo(mu).max() <= 1.0 + 1e-12, "{i}: {alpha}, {metallic}, {mu}");
+                assert!(difference <= TABLE_ERROR, "{i}, {difference}: {alpha}, {metallic}, {mu}");
+            }
+            for _ in 0..500 {
+                let (n, a, b) = (sphere(rng.uniform2()), sphere(rng.uniform2()), sphere(rng.uniform2()));
+                assert_eq!(law.evaluate(n, a, b), law.evaluate(n, -b, -a));
+            }
+        }
+    }
+    // Nothing over the base is a matt surface, whatever its roughness.
+    assert_eq!(Reflectance::layered(BASE, 0.0, 0.2, DIELECTRICS[3]).lambert(), Some(BASE));
+    let mirror = Reflectance::layered(BASE, 0.0, 0.0, DIELECTRICS[0]).delta_reflectance(1.0).unwrap();
+    assert!(largest_difference(mirror, Colour::grey(1.0 / 9.0)) < 1e-15);
+}
+
+#[test]
+fn a_law_with_another_base_colour_is_that_of_the_other_material() {
+    let (w_in, w_out) = (DVec3::new(0.6, 0.0, -0.8), DVec3::new(0.48, 0.6, 0.64));
+    for (metallic, alpha) in [(0.0, 0.1), (0.3, 0.01), (1.0, 0.5), (0.2, MIRROR)] {
+        let (one, other) = (law(Colour::WHITE, metallic, alpha), law(BASE, metallic, alpha));
+        let same = one.with_base(BASE);
+        assert_eq!(same.evaluate(DVec3::Z, w_in, w_out), other.evaluate(DVec3::Z, w_in, w_out));
+        assert_eq!((same.albedo(0.3), same.is_peaked()), (other.albedo(0.3), other.is_peaked()));
+    }
 }
 
 #[test]

@@ -67,7 +67,7 @@ impl<'a> Buffers<'a> {
 
     /// Positions of accessor `index`, which stands in `field` \[m, in the coordinates of its mesh\].
     pub fn positions(&self, index: usize, field: &str) -> Result<Vec<DVec3>> {
-        let elements = self.elements(index, field, "VEC3")?;
+        let elements = self.elements(index, field, &["VEC3"])?;
         let path = format!("accessors[{index}]");
         if elements.component == Component::U32 {
             return Err(self.file.bad(format_args!("{path}.componentType"), 5125, "5126 (float), for a position"));
@@ -83,9 +83,34 @@ impl<'a> Buffers<'a> {
         Ok(positions)
     }
 
+    /// The first `N` components of each element of accessor `index`, which stands in `field` and is one of `shapes`; all finite.
+    pub fn rows<const N: usize>(&self, index: usize, field: &str, shapes: &[&str]) -> Result<Vec<[f64; N]>> {
+        let elements = self.elements(index, field, shapes)?;
+        let path = format!("accessors[{index}]");
+        let mut rows = Vec::with_capacity(elements.count);
+        for i in 0..elements.count {
+            let row: [f64; N] = std::array::from_fn(|axis| elements.value(i, axis));
+            if !row.iter().all(|x| x.is_finite()) {
+                return Err(self.file.bad(format_args!("{path}, element {i}"), format!("{row:?}"), "finite numbers"));
+            }
+            rows.push(row);
+        }
+        Ok(rows)
+    }
+
+    /// Colours with alpha, which is 1 where accessor `index`, which stands in `field`, has none.
+    pub fn colours(&self, index: usize, field: &str) -> Result<Vec<[f64; 4]>> {
+        let shapes = &["VEC3", "VEC4"];
+        let accessor = self.file.item(&self.document.accessors, "accessors", index, field)?;
+        if accessor.shape == "VEC4" {
+            return self.rows::<4>(index, field, shapes);
+        }
+        Ok(self.rows::<3>(index, field, shapes)?.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect())
+    }
+
     /// Indices of accessor `index`, which stands in `field`; each is below `vertices`.
     pub fn indices(&self, index: usize, field: &str, vertices: usize) -> Result<Vec<u32>> {
-        let elements = self.elements(index, field, "SCALAR")?;
+        let elements = self.elements(index, field, &["SCALAR"])?;
         let path = format!("accessors[{index}]");
         if !matches!(elements.component, Component::U8 | Component::U16 | Component::U32) || elements.normalized {
             let code = self.document.accessors[index].component_type;
@@ -122,12 +147,14 @@ impl<'a> Buffers<'a> {
         Ok(&buffer[start..start + view.byte_length as usize])
     }
 
-    /// The elements of accessor `index`, which stands in `field` and must be of `shape`.
-    fn elements(&self, index: usize, field: &str, shape: &str) -> Result<Elements<'_>> {
+    /// The elements of accessor `index`, which stands in `field` and must be one of `shapes`.
+    fn elements(&self, index: usize, field: &str, shapes: &[&str]) -> Result<Elements<'_>> {
         let accessor = self.file.item(&self.document.accessors, "accessors", index, field)?;
         let path = format!("accessors[{index}]");
-        if accessor.shape != shape {
-            return Err(self.file.bad(format_args!("{path}.type"), &accessor.shape, format!("{shape}, for {field}")));
+        let shape = accessor.shape.as_str();
+        if !shapes.contains(&shape) {
+            let allowed = format!("{}, for {field}", shapes.join(" or "));
+            return Err(self.file.bad(format_args!("{path}.type"), shape, allowed));
         }
         let component = Component::from_code(accessor.component_type).ok_or_else(|| {
             let allowed = "5120, 5121, 5122, 5123, 5125 or 5126";
@@ -143,7 +170,12 @@ impl<'a> Buffers<'a> {
         };
         let bytes = self.view(view_index, &format!("{path}.bufferView"))?;
         let view = &self.document.buffer_views[view_index];
-        let width = if shape == "VEC3" { 3 } else { 1 };
+        let width = match shape {
+            "VEC2" => 2,
+            "VEC3" => 3,
+            "VEC4" => 4,
+            _ => 1,
+        };
         let stride = self.stride(view, view_index, component.size() * width, shape)?;
         self.aligned(accessor, view, &path, component)?;
         let bytes = self.range(accessor, bytes, &path, stride, component.size() as u64 * width as u64)?;
@@ -156,11 +188,11 @@ impl<'a> Buffers<'a> {
         let size = size as u64;
         match view.byte_stride {
             None => Ok(size),
-            Some(stride) if shape == "VEC3" && stride >= size && stride <= 252 && stride % 4 == 0 => Ok(stride),
+            Some(stride) if shape != "SCALAR" && stride >= size && stride <= 252 && stride % 4 == 0 => Ok(stride),
             Some(stride) => {
                 let allowed = match shape {
-                    "VEC3" => format!("a multiple of 4 in {size} .. 252"),
-                    _ => "none, for indices".to_owned(),
+                    "SCALAR" => "none, for indices".to_owned(),
+                    _ => format!("a multiple of 4 in {size} .. 252"),
                 };
                 Err(self.file.bad(format_args!("bufferViews[{index}].byteStride"), stride, allowed))
             }

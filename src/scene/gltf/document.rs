@@ -5,10 +5,16 @@
 //! the wrong type is reported with its path. Nothing is checked here but
 //! types: an index is proved where it is followed.
 
+mod materials;
+mod textures;
+
 use std::collections::BTreeMap;
 
 use serde::Deserialize;
 use serde::de::IgnoredAny;
+
+pub use materials::{Material, Specular};
+pub use textures::{Image, Sampler, Texture, TextureReference, TextureTransform};
 
 use super::problem::File;
 use crate::error::Result;
@@ -30,6 +36,7 @@ pub struct Document {
     pub buffers: Vec<Buffer>,
     pub materials: Vec<Material>,
     pub textures: Vec<Texture>,
+    pub samplers: Vec<Sampler>,
     pub images: Vec<Image>,
     pub cameras: Vec<Camera>,
     pub animations: Vec<IgnoredAny>,
@@ -129,6 +136,15 @@ pub struct NodeExtensions {
     pub lights_punctual: Option<NodeLight>,
     #[serde(rename = "EXT_lights_ies")]
     pub lights_ies: Option<NodeProfile>,
+    #[serde(rename = "EXT_mesh_gpu_instancing")]
+    pub instancing: Option<Instancing>,
+}
+
+/// Many places of the mesh of a node, by name of what is given of each.
+#[derive(Deserialize)]
+pub struct Instancing {
+    #[serde(default)]
+    pub attributes: BTreeMap<String, usize>,
 }
 
 /// A photometric web at a node.
@@ -196,114 +212,6 @@ pub struct Buffer {
 }
 
 #[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub struct Material {
-    pub name: Option<String>,
-    #[serde(default)]
-    pub pbr_metallic_roughness: MetallicRoughness,
-    pub normal_texture: Option<TextureReference>,
-    pub occlusion_texture: Option<TextureReference>,
-    pub emissive_texture: Option<TextureReference>,
-    #[serde(default)]
-    pub emissive_factor: [f64; 3],
-    #[serde(default = "opaque")]
-    pub alpha_mode: String,
-    #[serde(default)]
-    pub double_sided: bool,
-    #[serde(default)]
-    pub extensions: MaterialExtensions,
-}
-
-#[derive(Deserialize)]
-#[serde(default, rename_all = "camelCase")]
-pub struct MetallicRoughness {
-    pub base_color_factor: [f64; 4],
-    pub base_color_texture: Option<TextureReference>,
-    pub metallic_factor: f64,
-    pub roughness_factor: f64,
-    pub metallic_roughness_texture: Option<TextureReference>,
-}
-
-impl Default for MetallicRoughness {
-    fn default() -> Self {
-        MetallicRoughness {
-            base_color_factor: [1.0; 4],
-            base_color_texture: None,
-            metallic_factor: 1.0,
-            roughness_factor: 1.0,
-            metallic_roughness_texture: None,
-        }
-    }
-}
-
-#[derive(Deserialize, Default)]
-#[serde(default)]
-pub struct MaterialExtensions {
-    #[serde(rename = "KHR_materials_emissive_strength")]
-    pub emissive_strength: Option<EmissiveStrength>,
-    #[serde(rename = "KHR_materials_transmission")]
-    pub transmission: Option<Transmission>,
-    #[serde(rename = "KHR_materials_ior")]
-    pub ior: Option<Ior>,
-    #[serde(rename = "KHR_materials_volume")]
-    pub volume: Option<Volume>,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub struct Transmission {
-    #[serde(default)]
-    pub transmission_factor: f64,
-    pub transmission_texture: Option<TextureReference>,
-}
-
-#[derive(Deserialize)]
-pub struct Ior {
-    #[serde(default = "index_of_glass")]
-    pub ior: f64,
-}
-
-fn index_of_glass() -> f64 {
-    1.5
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub struct Volume {
-    #[serde(default)]
-    pub thickness_factor: f64,
-    pub attenuation_distance: Option<f64>,
-    #[serde(default = "white")]
-    pub attenuation_color: [f64; 3],
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub struct EmissiveStrength {
-    #[serde(default = "one")]
-    pub emissive_strength: f64,
-}
-
-#[derive(Deserialize)]
-pub struct TextureReference {
-    pub index: usize,
-}
-
-#[derive(Deserialize)]
-pub struct Texture {
-    pub name: Option<String>,
-    pub source: Option<usize>,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-pub struct Image {
-    pub name: Option<String>,
-    pub uri: Option<String>,
-    pub buffer_view: Option<usize>,
-}
-
-#[derive(Deserialize)]
 pub struct Camera {
     pub name: Option<String>,
     #[serde(rename = "type")]
@@ -339,10 +247,6 @@ fn quarter_pi() -> f64 {
 
 fn triangles() -> u64 {
     4
-}
-
-fn opaque() -> String {
-    "OPAQUE".to_owned()
 }
 
 /// Reads the JSON text; a value of the wrong type is named by its path.

@@ -5,21 +5,24 @@ use super::problem::{File, Warnings};
 use crate::error::Result;
 
 /// Extensions whose meaning is followed.
-const SUPPORTED: [&str; 7] = [
+const SUPPORTED: [&str; 10] = [
+    "EXT_mesh_gpu_instancing",
     "KHR_lights_punctual",
     "EXT_lights_ies",
     "KHR_materials_emissive_strength",
-    "KHR_mesh_quantization",
-    "KHR_materials_transmission",
     "KHR_materials_ior",
+    "KHR_materials_specular",
+    "KHR_materials_transmission",
     "KHR_materials_volume",
+    "KHR_mesh_quantization",
+    "KHR_texture_transform",
 ];
 
 /// Refuses a file that needs an extension not understood; lists those it merely uses, with the effect.
 pub fn check(file: File, document: &Document, warnings: &mut Warnings) -> Result<()> {
     for (i, name) in document.extensions_required.iter().enumerate() {
         if !SUPPORTED.contains(&name.as_str()) {
-            let allowed = format!("only {} can be required", SUPPORTED.join(", "));
+            let allowed = format!("only {} can be required{}", SUPPORTED.join(", "), remedy(name));
             return Err(file.bad(format_args!("extensionsRequired[{i}]"), name, allowed));
         }
     }
@@ -31,16 +34,32 @@ pub fn check(file: File, document: &Document, warnings: &mut Warnings) -> Result
     Ok(())
 }
 
+/// What to do about a file that needs the extension `name`.
+fn remedy(name: &str) -> &'static str {
+    match name {
+        "KHR_draco_mesh_compression" | "EXT_meshopt_compression" | "KHR_meshopt_compression" => {
+            "; export the scene without compression of its meshes"
+        }
+        "KHR_texture_basisu" | "EXT_texture_webp" | "EXT_texture_avif" | "MSFT_texture_dds" => {
+            "; export the scene with PNG or JPEG textures"
+        }
+        _ => "",
+    }
+}
+
 /// What ignoring the extension `name` changes; `None` where it changes nothing at all.
 fn effect(name: &str) -> Option<&'static str> {
     Some(match name {
         // Metadata carries no light.
         "KHR_xmp" | "KHR_xmp_json_ld" => return None,
-        "KHR_texture_transform" => "a texture counts by its mean colour, wherever it is laid",
+        // How the triangles of a polygon belong together.
+        "FB_ngon_encoding" => return None,
         "KHR_materials_unlit" => "its materials reflect by their metallic-roughness factors",
-        "KHR_materials_specular" => "the specular part of a dielectric keeps its full strength and no colour",
         "KHR_materials_diffuse_transmission" => "its materials are opaque",
         "KHR_materials_dispersion" => "glass refracts all colours alike",
+        "KHR_materials_subsurface" | "KHR_materials_volume_scatter" => {
+            "its materials scatter light at their surface only"
+        }
         "KHR_materials_clearcoat" => "no clear coat lies over its materials",
         "KHR_materials_sheen" => "its materials have no sheen",
         "KHR_materials_anisotropy" => "reflection is isotropic",
@@ -53,7 +72,6 @@ fn effect(name: &str) -> Option<&'static str> {
         "KHR_texture_basisu" | "EXT_texture_webp" | "EXT_texture_avif" | "MSFT_texture_dds" => {
             "the PNG or JPEG copy of an image is read"
         }
-        "EXT_mesh_gpu_instancing" => "each of its meshes stands once, at its node",
         "EXT_lights_image_based" | "KHR_lights_environment" => "these lights are dark",
         "KHR_node_visibility" => "hidden nodes are rendered",
         "KHR_animation_pointer" => "the scene is rendered as it stands without animation",

@@ -1,34 +1,21 @@
-//! Textures, of which for now only the mean colour is used.
-//!
-//! Pixels are counted by value before anything is averaged, so that the mean does not depend on the order of
-//! summation; the JPEG decoder is built without its CPU-specific paths for the same reason: same bits everywhere.
+//! Textures: an image of the file, decoded once, and how a material lays it on a surface.
 
 use std::collections::HashMap;
-use std::io::Cursor;
-
-use zune_core::bytestream::ZCursor;
-use zune_core::colorspace::ColorSpace;
-use zune_core::options::DecoderOptions;
-use zune_jpeg::JpegDecoder;
+use std::sync::Arc;
 
 use super::buffers::Buffers;
-use super::document::Document;
+use super::decode::decode;
+use super::document::{Document, Sampler, TextureReference, TextureTransform};
 use super::problem::File;
 use super::uri;
 use crate::error::Result;
-use crate::math::pow;
+use crate::math::{DVec2, sin_cos};
+use crate::scene::textures::{Coding, Filter, Image, Layer, Transform, Wrap};
 
-/// Most pixels of an image (8192 x 8192): a small file may claim any size.
-const MAX_PIXELS: u64 = 1 << 26;
-
-/// Mean of an image over all its pixels.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Mean {
-    /// Of the linear values that sRGB encodes: a colour.
-    pub colour: [f64; 3],
-    /// Of the values as stored, 0 .. 1: data such as roughness.
-    pub stored: [f64; 3],
-}
+/// Largest memory of all images of a scene \[bytes\].
+const MOST_BYTES: u64 = 1 << 30;
+/// Largest number in a transform: positions in an image keep some digits.
+const FARTHEST: f64 = 1e6;
 
 /// The images of the file, each decoded at most once.
 pub struct Images<'a> {
@@ -36,7 +23,8 @@ pub struct Images<'a> {
     document: &'a Document,
     buffers: &'a Buffers<'a>,
     fetch: &'a mut dyn FnMut(&str) -> Result<Vec<u8>>,
-    means: HashMap<usize, Mean>,
+    decoded: HashMap<usize, Arc<Image>>,
+    bytes: u64,
 }
 
 impl<'a> Images<'a> {
@@ -47,27 +35,69 @@ impl<'a> Images<'a> {
         buffers: &'a Buffers<'a>,
         fetch: &'a mut dyn FnMut(&str) -> Result<Vec<u8>>,
     ) -> Self {
-        Images { file, document, buffers, fetch, means: HashMap::new() }
+        Images { file, document, buffers, fetch, decoded: HashMap::new(), bytes: 0 }
     }
 
-    /// Mean of texture `index`, which stands in `field`, and what to call it.
-    pub fn mean(&mut self, index: usize, field: &str) -> Result<(Mean, String)> {
-        let texture = self.file.item(&self.document.textures, "textures", index, field)?;
+    /// The texture that `reference` names, which stands in `field`; the layer's set is the number in TEXCOORD_n.
+    pub fn layer(&mut self, reference: &TextureReference, field: &str, coding: Coding) -> Result<Layer> {
+        let path = format!("{field}.index");
+        let texture = self.file.item(&self.document.textures, "textures", reference.index, path)?;
+        let sampler = match texture.sampler {
+            Some(index) => {
+                let path = format!("textures[{}].sampler", reference.index);
+                Some(self.file.item(&self.document.samplers, "samplers", index, path)?)
+            }
+            None => None,
+        };
+        let (filter, wrap) = self.sampling(sampler, texture.sampler.unwrap_or(0))?;
+        let transform = reference.extensions.transform.as_ref();
+        let set = transform.and_then(|t| t.tex_coord).unwrap_or(reference.tex_coord);
+        let transform = match transform {
+            Some(transform) => self.transform(transform, &format!("{field}.extensions.KHR_texture_transform"))?,
+            None => Transform::IDENTITY,
+        };
+        let image = self.image(reference.index)?;
+        Ok(Layer { image, coding, filter, wrap, set, transform })
+    }
+
+    /// Mean over the image of the texture that `reference` names, which stands in `field`.
+    pub fn mean(&mut self, reference: &TextureReference, field: &str, coding: Coding) -> Result<[f64; 4]> {
+        self.file.item(&self.document.textures, "textures", reference.index, format!("{field}.index"))?;
+        Ok(self.image(reference.index)?.mean(coding))
+    }
+
+    /// The image of texture `index`, which exists.
+    fn image(&mut self, index: usize) -> Result<Arc<Image>> {
+        let texture = &self.document.textures[index];
         let path = format!("textures[{index}].source");
         let Some(source) = texture.source else {
-            return Err(self.file.bad(path, "none", "a PNG or JPEG image"));
+            let allowed = match texture.extensions.keys().next() {
+                Some(extension) => {
+                    format!(
+                        "a PNG or JPEG image beside that of {extension}: export the scene with PNG or JPEG textures"
+                    )
+                }
+                None => "a PNG or JPEG image".to_owned(),
+            };
+            return Err(self.file.bad(path, "none", allowed));
         };
         let image = self.file.item(&self.document.images, "images", source, &path)?;
         let name = image.name.clone().or_else(|| texture.name.clone()).unwrap_or_else(|| format!("images[{source}]"));
-        if let Some(&mean) = self.means.get(&source) {
-            return Ok((mean, name));
+        if let Some(image) = self.decoded.get(&source) {
+            return Ok(image.clone());
         }
         let bytes = self.bytes(source)?;
-        let mean = decode(&bytes).map_err(|reason| {
-            self.file.bad(format_args!("images[{source}]"), &name, format!("a PNG or JPEG image ({reason})"))
-        })?;
-        self.means.insert(source, mean);
-        Ok((mean, name))
+        let path = format!("images[{source}]");
+        let image =
+            decode(&bytes).map_err(|reason| self.file.bad(&path, &name, format!("a PNG or JPEG image ({reason})")))?;
+        self.bytes += image.bytes();
+        if self.bytes > MOST_BYTES {
+            let allowed = format!("at most {MOST_BYTES} bytes in all images");
+            return Err(self.file.bad(path, format_args!("{} bytes of texels", self.bytes), allowed));
+        }
+        let image = Arc::new(image);
+        self.decoded.insert(source, image.clone());
+        Ok(image)
     }
 
     /// The encoded bytes of image `index`.
@@ -80,121 +110,34 @@ impl<'a> Images<'a> {
             _ => Err(self.file.bad(path, "no source or two", "either `uri` or `bufferView`")),
         }
     }
-}
 
-/// Mean of an encoded image, or why it cannot be had.
-fn decode(bytes: &[u8]) -> std::result::Result<Mean, String> {
-    let histogram = match bytes {
-        [0x89, b'P', b'N', b'G', ..] => png(bytes)?,
-        [0xff, 0xd8, 0xff, ..] => jpeg(bytes)?,
-        _ => return Err("it is in another format".to_owned()),
-    };
-    Ok(histogram.mean())
-}
-
-/// Counts the pixels of a PNG row by row, so that memory does not grow with the size it claims.
-fn png(bytes: &[u8]) -> std::result::Result<Histogram, String> {
-    let mut decoder = png::Decoder::new(Cursor::new(bytes));
-    decoder.set_transformations(png::Transformations::EXPAND);
-    let mut reader = decoder.read_info().map_err(|error| error.to_string())?;
-    let (width, height) = reader.info().size();
-    check_size(width.into(), height.into())?;
-    let (colour, depth) = reader.output_color_type();
-    let grey = matches!(colour, png::ColorType::Grayscale | png::ColorType::GrayscaleAlpha);
-    // EXPAND leaves no other depths.
-    let (sample, levels) = if depth == png::BitDepth::Sixteen { (2, 1 << 16) } else { (1, 1 << 8) };
-    let mut histogram = Histogram::new(levels);
-    let mut counted = 0;
-    while let Some(row) = reader.next_row().map_err(|error| error.to_string())? {
-        for pixel in row.data().chunks_exact(colour.samples() * sample) {
-            histogram.count([0, 1, 2].map(|channel| {
-                let at = if grey { 0 } else { channel * sample };
-                pixel[at..at + sample].iter().fold(0, |value, &byte| value << 8 | usize::from(byte))
-            }));
-            counted += 1;
-        }
-    }
-    // An interlaced image passes every pixel once, in another order.
-    (counted == u64::from(width) * u64::from(height)).then_some(histogram).ok_or_else(|| "it is incomplete".to_owned())
-}
-
-/// Counts the pixels of a JPEG.
-fn jpeg(bytes: &[u8]) -> std::result::Result<Histogram, String> {
-    // Strict: otherwise a truncated image ends in grey without a word.
-    let options = DecoderOptions::new_safe().set_strict_mode(true).jpeg_set_out_colorspace(ColorSpace::RGB);
-    let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
-    decoder.decode_headers().map_err(|error| error.to_string())?;
-    let size = decoder.info().ok_or("it has no header")?;
-    check_size(size.width.into(), size.height.into())?;
-    let pixels = decoder.decode().map_err(|error| error.to_string())?;
-    let mut histogram = Histogram::new(1 << 8);
-    for pixel in pixels.chunks_exact(3) {
-        histogram.count([pixel[0], pixel[1], pixel[2]].map(usize::from));
-    }
-    Ok(histogram)
-}
-
-/// Refuses images without pixels and those beyond [`MAX_PIXELS`].
-fn check_size(width: u64, height: u64) -> std::result::Result<(), String> {
-    match width.checked_mul(height) {
-        Some(1..=MAX_PIXELS) => Ok(()),
-        _ => Err(format!("it has {width} x {height} pixels, allowed are 1 .. {MAX_PIXELS}")),
-    }
-}
-
-/// How often each value occurs in each channel.
-struct Histogram {
-    counts: [Vec<u64>; 3],
-}
-
-impl Histogram {
-    /// Of an image whose values are below `levels`.
-    fn new(levels: usize) -> Self {
-        Histogram { counts: std::array::from_fn(|_| vec![0; levels]) }
+    /// What `sampler`, number `index`, says; glTF leaves the filter of a texture without one to us.
+    fn sampling(&self, sampler: Option<&Sampler>, index: usize) -> Result<(Filter, [Wrap; 2])> {
+        let Some(sampler) = sampler else { return Ok((Filter::Bilinear, [Wrap::Repeat; 2])) };
+        let path = format!("samplers[{index}]");
+        let filter = match sampler.mag_filter {
+            Some(9728) => Filter::Nearest,
+            None | Some(9729) => Filter::Bilinear,
+            Some(other) => return Err(self.file.bad(format_args!("{path}.magFilter"), other, "9728 or 9729")),
+        };
+        let wrap = |name: &str, code: u64| match code {
+            33071 => Ok(Wrap::Clamp),
+            33648 => Ok(Wrap::Mirror),
+            10497 => Ok(Wrap::Repeat),
+            other => Err(self.file.bad(format_args!("{path}.{name}"), other, "33071, 33648 or 10497")),
+        };
+        Ok((filter, [wrap("wrapS", sampler.wrap_s)?, wrap("wrapT", sampler.wrap_t)?]))
     }
 
-    /// Counts one pixel.
-    fn count(&mut self, pixel: [usize; 3]) {
-        for (counts, value) in self.counts.iter_mut().zip(pixel) {
-            counts[value] += 1;
-        }
-    }
-
-    /// Mean of what was counted, at least one pixel.
-    fn mean(&self) -> Mean {
-        let of = |f: fn(f64) -> f64| [0, 1, 2].map(|channel| mean_of(&self.counts[channel], f));
-        Mean { colour: of(linear), stored: of(|value| value) }
-    }
-}
-
-/// Mean of `f(value / full scale)` over the counts of a channel.
-fn mean_of(counts: &[u64], f: fn(f64) -> f64) -> f64 {
-    let full = (counts.len() - 1) as f64;
-    let seen = counts.iter().enumerate().filter(|&(_, &count)| count > 0);
-    let sum: f64 = seen.map(|(value, &count)| count as f64 * f(value as f64 / full)).sum();
-    (sum / counts.iter().sum::<u64>() as f64).min(1.0)
-}
-
-/// Linear value of the sRGB value `s` (IEC 61966-2-1).
-fn linear(s: f64) -> f64 {
-    if s <= 0.04045 { s / 12.92 } else { pow((s + 0.055) / 1.055, 2.4) }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn srgb_ends_are_exact_and_half_is_0_214() {
-        assert_eq!((linear(0.0), linear(1.0)), (0.0, 1.0));
-        assert!((linear(0.5) - 0.214_041_140_482).abs() < 1e-12);
-    }
-
-    #[test]
-    fn sizes_that_do_not_fit_are_refused() {
-        assert!(check_size(8192, 8192).is_ok());
-        assert!(check_size(8193, 8192).is_err());
-        assert!(check_size(0, 5).is_err());
-        assert!(check_size(u64::MAX, 2).is_err());
+    /// offset + rotation of the scaled coordinates, the rotation counter-clockwise as one looks at the image.
+    fn transform(&self, transform: &TextureTransform, path: &str) -> Result<Transform> {
+        let within =
+            |name: &str, value| self.file.all_between(format_args!("{path}.{name}"), value, -FARTHEST, FARTHEST);
+        let offset = within("offset", transform.offset)?;
+        let [x, y] = within("scale", transform.scale)?;
+        let rotation = self.file.between(format_args!("{path}.rotation"), transform.rotation, -FARTHEST, FARTHEST)?;
+        let (sin, cos) = sin_cos(rotation);
+        let (u, v) = (DVec2::new(cos, -sin) * x, DVec2::new(sin, cos) * y);
+        Ok(Transform { u, v, offset: DVec2::from_array(offset) })
     }
 }

@@ -6,12 +6,14 @@ use std::collections::HashMap;
 
 use super::buffers::Buffers;
 use super::document::{Document, Primitive};
-use super::materials::Materials;
+use super::instances;
+use super::materials::{Materials, texcoord};
 use super::nodes::{Placed, to_world};
 use super::problem::{File, Warnings};
 use crate::error::Result;
 use crate::math::DVec3;
 use crate::scene::Model;
+use crate::scene::textures::{Charts, Textures};
 
 /// Most vertices and most triangles of a scene: many nodes may show one mesh, so a small file may describe any number.
 const MOST: usize = 1 << 26;
@@ -27,6 +29,8 @@ pub struct Baker<'a> {
     surface_of: Vec<u32>,
     /// Node of each triangle.
     node_of: Vec<u32>,
+    /// Where textures lie.
+    charts: Charts,
     /// Triangles without area, which were dropped.
     dropped: usize,
     /// How many nodes show each mesh; 0 once room is claimed for all of them.
@@ -55,9 +59,11 @@ impl<'a> Baker<'a> {
         nodes: &[Placed],
     ) -> Self {
         let mut unclaimed = vec![0; document.meshes.len()];
-        for mesh in nodes.iter().filter_map(|placed| placed.node.mesh) {
+        for node in nodes.iter().map(|placed| placed.node) {
             // A mesh that does not exist is refused when its node is reached.
-            unclaimed.get_mut(mesh).into_iter().for_each(|count| *count += 1);
+            let times = node.mesh.and_then(|mesh| unclaimed.get_mut(mesh));
+            let more = instances::count(document, node.extensions.instancing.as_ref());
+            times.into_iter().for_each(|times: &mut usize| *times = times.saturating_add(more));
         }
         Baker {
             file,
@@ -68,6 +74,7 @@ impl<'a> Baker<'a> {
             triangles: Vec::new(),
             surface_of: Vec::new(),
             node_of: Vec::new(),
+            charts: Charts::default(),
             dropped: 0,
             unclaimed,
             vertices_claimed: 0,
@@ -77,6 +84,14 @@ impl<'a> Baker<'a> {
 
     /// Adds mesh `index` as node `placed` shows it.
     pub fn add(&mut self, placed: &Placed, index: usize, warnings: &mut Warnings) -> Result<()> {
+        // The first place of a mesh claims room for all, so what is listed here is bounded by what may be shown.
+        for place in instances::places(self.file, self.buffers, placed, warnings)? {
+            self.add_one(&place, index, warnings)?;
+        }
+        Ok(())
+    }
+
+    fn add_one(&mut self, placed: &Placed, index: usize, warnings: &mut Warnings) -> Result<()> {
         let field = format_args!("nodes[{}].mesh", placed.index);
         let mesh = self.file.item(&self.document.meshes, "meshes", index, field)?;
         let label = mesh.name.as_ref().map_or_else(|| format!("meshes[{index}]"), |name| format!("mesh `{name}`"));
@@ -87,10 +102,11 @@ impl<'a> Baker<'a> {
             let path = format!("meshes[{index}].primitives[{p}]");
             let Some(mode) = self.mode(primitive, &path, &label, warnings)? else { continue };
             note_ignored(primitive, &label, warnings);
-            let surface = self.materials.surface(primitive.material, &format!("{path}.material"), &label, warnings)?;
+            let surface = self.materials.surface(primitive, &path, &label, warnings)?;
             let vertices = self.vertices(primitive, &path, placed, times, &mut first_of)?;
             let corners = self.corners(primitive, &path, mode, vertices.1, times)?;
-            self.push(corners, vertices.0, placed, surface);
+            let varying = self.varying(primitive, &path, surface, vertices.1)?;
+            self.push(corners, vertices.0, placed, surface, varying.as_deref());
         }
         Ok(())
     }
@@ -104,7 +120,9 @@ impl<'a> Baker<'a> {
         model.triangles = self.triangles;
         model.surface_of = self.surface_of;
         model.nodes.of_triangle = self.node_of;
-        model.surfaces = self.materials.into_surfaces();
+        let (surfaces, textured) = self.materials.into_surfaces();
+        model.surfaces = surfaces;
+        model.textures = Textures::new(textured, self.charts);
         model.drop_unused_vertices();
     }
 
@@ -194,14 +212,52 @@ impl<'a> Baker<'a> {
         })
     }
 
-    /// Adds triangles of `surface` at the node `placed`, their vertices counted from `first`. A mirrored node turns
-    /// their order round, so that the front stays the front.
-    fn push(&mut self, corners: Vec<[u32; 3]>, first: u32, placed: &Placed, surface: u32) {
+    /// For each of the `count` vertices of `primitive` its coordinates and colour, as far as `surface` wants them.
+    fn varying(&self, primitive: &Primitive, path: &str, surface: u32, count: usize) -> Result<Option<Vec<Vec<f32>>>> {
+        let Some((textured, sets)) = self.materials.textured(surface, primitive.material) else { return Ok(None) };
+        let mut numbers = vec![Vec::with_capacity(textured.width()); count];
+        let mut add = |attribute: &str, rows: Vec<&[f64]>| {
+            if rows.len() != count {
+                let allowed = format!("{count} elements, as POSITION has");
+                return Err(self.file.bad(format_args!("{path}.attributes.{attribute}"), rows.len(), allowed));
+            }
+            numbers.iter_mut().zip(rows).for_each(|(own, row)| own.extend(row.iter().map(|&x| x as f32)));
+            Ok(())
+        };
+        let accessor = |attribute: &str| (primitive.attributes[attribute], format!("{path}.attributes.{attribute}"));
+        for attribute in sets.into_iter().map(texcoord) {
+            let (index, field) = accessor(&attribute);
+            let rows = self.buffers.rows::<2>(index, &field, &["VEC2"])?;
+            add(&attribute, rows.iter().map(|row| &row[..]).collect())?;
+        }
+        if textured.coloured {
+            let (index, field) = accessor("COLOR_0");
+            let mut rows = self.buffers.colours(index, &field)?;
+            rows.as_flattened_mut().iter_mut().for_each(|channel| *channel = channel.clamp(0.0, 1.0));
+            add("COLOR_0", rows.iter().map(|row| &row[..]).collect())?;
+        }
+        Ok(Some(numbers))
+    }
+
+    /// Adds triangles of `surface` at the node `placed`, their vertices counted from `first`, with what stands at each vertex. A
+    /// mirrored node turns their order round, so that the front stays the front.
+    fn push(
+        &mut self,
+        corners: Vec<[u32; 3]>,
+        first: u32,
+        placed: &Placed,
+        surface: u32,
+        varying: Option<&[Vec<f32>]>,
+    ) {
         let mirrored = placed.world.determinant() < 0.0;
         for [a, b, c] in corners {
-            let triangle = if mirrored { [a, c, b] } else { [a, b, c] }.map(|corner| first + corner);
+            let own = if mirrored { [a, c, b] } else { [a, b, c] };
+            let triangle = own.map(|corner| first + corner);
             let [p, q, r] = triangle.map(|corner| self.positions[corner as usize]);
             if (q - p).cross(r - p).length() > 0.0 {
+                if let Some(numbers) = varying {
+                    self.charts.push(self.triangles.len(), own.map(|corner| &numbers[corner as usize][..]));
+                }
                 self.triangles.push(triangle);
                 self.surface_of.push(surface);
                 self.node_of.push(placed.place);
@@ -217,8 +273,8 @@ fn note_ignored(primitive: &Primitive, mesh: &str, warnings: &mut Warnings) {
     if !primitive.targets.is_empty() {
         warnings.add(format!("{mesh}: morph targets are ignored: the mesh keeps its basic shape"));
     }
-    if primitive.attributes.keys().any(|name| name.starts_with("COLOR_")) {
-        warnings.add(format!("{mesh}: vertex colours are ignored: the material alone gives the colour"));
+    if primitive.attributes.keys().any(|name| name.starts_with("COLOR_") && name != "COLOR_0") {
+        warnings.add(format!("{mesh}: vertex colours beyond COLOR_0 are ignored"));
     }
     if primitive.attributes.contains_key("NORMAL") {
         warnings.add("interpolated normals are not used: all cosines are those of the geometry");

@@ -9,15 +9,18 @@
 //! model or an [`Error::Input`](crate::error::Error::Input) that names the field, never a panic.
 //!
 //! The order of the work, a file each: container and JSON (`document`), `extensions`, `buffers`, `nodes`, and at each
-//! node its mesh (`meshes`, `materials`, `glass`, `images`), camera (`cameras`) and lights (`lights`, `ies`).
+//! node its mesh (`meshes`, `instances`, `materials`, `glass`, `images`, `decode`), camera (`cameras`) and lights (`lights`,
+//! `ies`).
 
 mod buffers;
 mod cameras;
+mod decode;
 mod document;
 mod extensions;
 mod glass;
 mod ies;
 mod images;
+mod instances;
 mod lights;
 mod materials;
 mod meshes;

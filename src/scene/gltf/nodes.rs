@@ -29,6 +29,13 @@ pub struct Placed<'a> {
     pub world: DMat4,
 }
 
+impl<'a> Placed<'a> {
+    /// The same node standing at `world`.
+    pub fn at(&self, world: DMat4) -> Placed<'a> {
+        Placed { world, ..*self }
+    }
+}
+
 impl Placed<'_> {
     /// What to call the node in a message.
     pub fn label(&self) -> String {

@@ -1,9 +1,9 @@
 //! Directional albedo of the specular part, tabulated over the cosine of incidence.
 //!
-//! Schlick's factor is linear in F0, so two functions of the cosine serve all colours:
+//! Schlick's factor is linear in F0 and F90, so two functions of the cosine serve all colours:
 //!
 //! ```text
-//! a(mu) = F0 A(mu) + B(mu),   A = E[g (1 - s)],  B = E[g s],  s = (1 - (v,h))^5
+//! a(mu) = F0 A(mu) + F90 B(mu),   A = E[g (1 - s)],  B = E[g s],  s = (1 - (v,h))^5
 //! g     = law |cos| / density = mu' (k mu + t(mu)) / (mu' t(mu) + mu t(mu'))
 //! ```
 //!
@@ -28,7 +28,7 @@ const AZIMUTHS: usize = 32;
 pub(super) struct Coefficients {
     /// Factor of F0.
     pub a: f64,
-    /// Rest, the grazing rise of Schlick's factor.
+    /// Factor of F90, the grazing rise of Schlick's factor.
     pub b: f64,
 }
 
@@ -42,9 +42,9 @@ impl Coefficients {
     /// Means for a mirror: 2 int (1 - mu)^5 mu dmu = 1/21.
     pub const MIRROR_MEAN: Coefficients = Coefficients { a: 20.0 / 21.0, b: 1.0 / 21.0 };
 
-    /// F0 A + B.
-    pub fn albedo(self, f0: f64) -> f64 {
-        f0 * self.a + self.b
+    /// F0 A + F90 B.
+    pub fn albedo(self, f0: f64, f90: f64) -> f64 {
+        f0 * self.a + f90 * self.b
     }
 }
 
@@ -138,8 +138,8 @@ mod tests {
         let (n, mut sum) = (200_000, 0.0);
         for i in 0..n {
             let mu = (i as f64 + 0.5) / n as f64;
-            sum += 2.0 * mu * table.at(mu).albedo(0.3) / n as f64;
+            sum += 2.0 * mu * table.at(mu).albedo(0.3, 1.0) / n as f64;
         }
-        assert!((sum - table.mean().albedo(0.3)).abs() < 1e-8);
+        assert!((sum - table.mean().albedo(0.3, 1.0)).abs() < 1e-8);
     }
 }

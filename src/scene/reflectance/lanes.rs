@@ -13,6 +13,7 @@ use crate::geometry::simd::Vector;
 use crate::geometry::simd::exact::{Triple, add, cross, dot};
 use crate::math::PI;
 use crate::photometry::{Colour, REC709};
+use std::sync::Arc;
 
 /// What a divisor that may vanish with its dividend is kept above: nothing that counts comes near it.
 const TINY: f32 = 1e-30;
@@ -20,16 +21,36 @@ const TINY: f32 = 1e-30;
 /// A law of reflection with its parameters in f32.
 #[derive(Clone, Debug)]
 pub struct LawInLanes {
-    f0: [f32; 3],
-    diffuse: [f32; 3],
-    has_diffuse: bool,
-    specular: Specular,
+    tint: Tint,
+    specular: Arc<SpecularInLanes>,
     /// A law of another kind, evaluated lane by lane.
-    other: Option<Box<Directional>>,
+    other: Option<Arc<Directional>>,
 }
 
+/// What of a law depends on the colours of the material.
+#[derive(Clone, Copy, Debug)]
+pub struct Tint {
+    /// Specular reflectance at normal incidence.
+    pub f0: [f32; 3],
+    /// The same at grazing incidence.
+    pub f90: f32,
+    /// What f has under the specular part, over what gets through it twice \[1/sr\].
+    pub diffuse: [f32; 3],
+}
+
+/// The tints of the laws in the lanes.
+pub struct Tints<V, const C: usize> {
+    /// Of each channel the specular reflectance at normal incidence.
+    pub f0: [V; C],
+    /// The same at grazing incidence.
+    pub f90: V,
+    /// Of each channel what is under it; `None` where there is nothing in any lane.
+    pub diffuse: Option<[V; C]>,
+}
+
+/// The outer surface of a law, whatever its colours.
 #[derive(Clone, Debug)]
-enum Specular {
+pub(super) enum SpecularInLanes {
     Mirror,
     Rough { alpha2: f32, intervals: Box<[Interval; INTERVALS]> },
 }
@@ -37,30 +58,38 @@ enum Specular {
 /// A and B where an interval of the table begins, and how much they rise in it.
 type Interval = [f32; 4];
 
-impl LawInLanes {
-    /// The law over a mirror.
-    pub(super) fn mirror(f0: Colour, diffuse: Colour) -> Self {
-        Self::new(f0, diffuse, Specular::Mirror)
-    }
-
-    /// The law of roughness `alpha2`, the square of alpha, with A and B of its specular albedo.
-    pub(super) fn rough(f0: Colour, diffuse: Colour, alpha2: f64, nodes: &[Coefficients]) -> Self {
+impl SpecularInLanes {
+    /// That of roughness `alpha2`, the square of alpha, with A and B of its specular albedo.
+    pub(super) fn rough(alpha2: f64, nodes: &[Coefficients]) -> Self {
         let mut intervals = Box::new([[0.0; 4]; INTERVALS]);
         for (interval, ends) in intervals.iter_mut().zip(nodes.windows(2)) {
             let (rise_a, rise_b) = (ends[1].a - ends[0].a, ends[1].b - ends[0].b);
             *interval = [ends[0].a, ends[0].b, rise_a, rise_b].map(|x| x as f32);
         }
-        Self::new(f0, diffuse, Specular::Rough { alpha2: alpha2 as f32, intervals })
+        SpecularInLanes::Rough { alpha2: alpha2 as f32, intervals }
+    }
+}
+
+impl LawInLanes {
+    pub(super) fn new((f0, f90): (Colour, f64), diffuse: Colour, specular: Arc<SpecularInLanes>) -> Self {
+        let narrow = |c: Colour| c.0.map(|c| c as f32);
+        LawInLanes { tint: Tint { f0: narrow(f0), f90: f90 as f32, diffuse: narrow(diffuse) }, specular, other: None }
     }
 
     /// The law of another kind.
     pub(super) fn one_by_one(law: Directional) -> Self {
-        LawInLanes { other: Some(Box::new(law)), ..Self::mirror(Colour::BLACK, Colour::BLACK) }
+        let none = Self::new((Colour::BLACK, 0.0), Colour::BLACK, Arc::new(SpecularInLanes::Mirror));
+        LawInLanes { other: Some(Arc::new(law)), ..none }
     }
 
-    fn new(f0: Colour, diffuse: Colour, specular: Specular) -> Self {
-        let narrow = |c: Colour| c.0.map(|c| c as f32);
-        LawInLanes { f0: narrow(f0), diffuse: narrow(diffuse), has_diffuse: !diffuse.is_black(), specular, other: None }
+    /// What depends on the colours of the material.
+    pub fn tint(&self) -> &Tint {
+        &self.tint
+    }
+
+    /// True where `other` differs in nothing but its tint, and may stand for this one in [`LawInLanes::evaluate_tinted`].
+    pub fn is_like(&self, other: &LawInLanes) -> bool {
+        Arc::ptr_eq(&self.specular, &other.specular)
     }
 
     /// f in `C` channels without the delta component \[1/sr\]; 0 where a direction lies below the surface. Both directions are
@@ -70,8 +99,26 @@ impl LawInLanes {
     pub fn evaluate<V: Vector<Array = [f32; 16]>, const C: usize>(
         &self,
         normal: &Triple<V>,
+        from: (&Triple<V>, &[V; C]),
+        other: &Triple<V>,
+    ) -> [V; C] {
+        let (mut f0, mut diffuse) = ([V::splat(0.0); C], [V::splat(0.0); C]);
+        for c in 0..C {
+            f0[c] = V::splat(self.tint.f0[c]);
+            diffuse[c] = V::splat(self.tint.diffuse[c]);
+        }
+        let diffuse = if self.tint.diffuse == [0.0; 3] { None } else { Some(diffuse) };
+        self.evaluate_tinted(normal, from, other, &Tints { f0, f90: V::splat(self.tint.f90), diffuse })
+    }
+
+    /// The same with `tints`, those of the laws like this one that belong to the lanes.
+    #[inline(always)]
+    pub fn evaluate_tinted<V: Vector<Array = [f32; 16]>, const C: usize>(
+        &self,
+        normal: &Triple<V>,
         (one, through): (&Triple<V>, &[V; C]),
         other: &Triple<V>,
+        tints: &Tints<V, C>,
     ) -> [V; C] {
         if let Some(law) = &self.other {
             return lane_by_lane(law, normal, one, other);
@@ -80,58 +127,53 @@ impl LawInLanes {
         let cosines = [dot(normal, one), dot(normal, other)];
         let above = zero.less(cosines[0]) & zero.less(cosines[1]);
         let mut f = [zero; C];
-        if let Specular::Rough { alpha2, .. } = self.specular {
-            self.add_specular(&mut f, alpha2, normal, &add(one, other), cosines);
+        if let SpecularInLanes::Rough { alpha2, .. } = *self.specular {
+            add_specular(&mut f, tints, alpha2, normal, &add(one, other), cosines);
         }
-        if self.has_diffuse {
-            self.add_diffuse(&mut f, through, cosines[1]);
+        if let Some(diffuse) = &tints.diffuse {
+            let [a, b] = self.specular.albedo(cosines[1]);
+            for c in 0..C {
+                let through_other = V::splat(1.0).sub(tints.f0[c].mul(a).add(tints.f90.mul(b)));
+                f[c] = f[c].add(diffuse[c].mul(through[c].mul(through_other)));
+            }
         }
         for c in 0..C {
             f[c] = f[c].select(above);
         }
         f
     }
+}
 
-    /// F D V, of the sum of the two directions.
-    #[inline(always)]
-    fn add_specular<V: Vector, const C: usize>(
-        &self,
-        f: &mut [V; C],
-        alpha2: f32,
-        normal: &Triple<V>,
-        sum: &Triple<V>,
-        [mu, nu]: [V; 2],
-    ) {
-        let (alpha2, rest) = (V::splat(alpha2), V::splat(1.0 - alpha2));
-        let stretched = |mu: V| alpha2.add(rest.mul(mu.mul(mu))).sqrt();
-        let across = cross(normal, sum);
-        let (length2, along) = (dot(sum, sum), mu.add(nu));
-        let spread = alpha2.mul(along.mul(along)).add(dot(&across, &across));
-        let ratio = length2.div(spread.max(V::splat(TINY)));
-        let reach = nu.mul(stretched(mu)).add(mu.mul(stretched(nu))).max(V::splat(TINY));
-        let law = alpha2.mul(V::splat((0.5 / PI) as f32)).mul(ratio.mul(ratio)).div(reach);
-        let rise = fresnel_rise(V::splat(0.5).mul(length2.sqrt()));
-        for c in 0..C {
-            let f0 = V::splat(self.f0[c]);
-            f[c] = f[c].add(f0.add(V::splat(1.0).sub(f0).mul(rise)).mul(law));
-        }
+/// F D V, of the sum of the two directions.
+#[inline(always)]
+fn add_specular<V: Vector, const C: usize>(
+    f: &mut [V; C],
+    tints: &Tints<V, C>,
+    alpha2: f32,
+    normal: &Triple<V>,
+    sum: &Triple<V>,
+    [mu, nu]: [V; 2],
+) {
+    let (alpha2, rest) = (V::splat(alpha2), V::splat(1.0 - alpha2));
+    let stretched = |mu: V| alpha2.add(rest.mul(mu.mul(mu))).sqrt();
+    let across = cross(normal, sum);
+    let (length2, along) = (dot(sum, sum), mu.add(nu));
+    let spread = alpha2.mul(along.mul(along)).add(dot(&across, &across));
+    let ratio = length2.div(spread.max(V::splat(TINY)));
+    let reach = nu.mul(stretched(mu)).add(mu.mul(stretched(nu))).max(V::splat(TINY));
+    let law = alpha2.mul(V::splat((0.5 / PI) as f32)).mul(ratio.mul(ratio)).div(reach);
+    let rise = fresnel_rise(V::splat(0.5).mul(length2.sqrt()));
+    for c in 0..C {
+        let f0 = tints.f0[c];
+        f[c] = f[c].add(f0.add(tints.f90.sub(f0).mul(rise)).mul(law));
     }
+}
 
-    /// What is under the specular part, of light that gets `through` it on one side and leaves or comes at the cosine `mu`.
-    #[inline(always)]
-    fn add_diffuse<V: Vector<Array = [f32; 16]>, const C: usize>(&self, f: &mut [V; C], through: &[V; C], mu: V) {
-        let one = V::splat(1.0);
-        let [a, b] = self.albedo(mu);
-        for c in 0..C {
-            let other = one.sub(V::splat(self.f0[c]).mul(a).add(b));
-            f[c] = f[c].add(V::splat(self.diffuse[c]).mul(through[c].mul(other)));
-        }
-    }
-
+impl SpecularInLanes {
     /// A and B at the cosine `mu`.
     #[inline(always)]
     fn albedo<V: Vector<Array = [f32; 16]>>(&self, mu: V) -> [V; 2] {
-        let Specular::Rough { intervals, .. } = &self.specular else {
+        let SpecularInLanes::Rough { intervals, .. } = self else {
             let rise = fresnel_rise(mu);
             return [V::splat(1.0).sub(rise), rise];
         };

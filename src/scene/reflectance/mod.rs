@@ -16,6 +16,7 @@ mod lanes;
 mod microfacet;
 mod pane;
 mod phong;
+mod specular;
 mod tabulated;
 
 use crate::math::{DVec3, PI, to_world};
@@ -27,8 +28,10 @@ use phong::Phong;
 
 pub use delta::Delta;
 pub use glass::Glass;
-pub use lanes::{LawInLanes, weights_over_tolerated};
+pub use glossy::Dielectric;
+pub use lanes::{LawInLanes, Tint, Tints, weights_over_tolerated};
 pub use pane::Pane;
+pub use specular::Finish;
 pub use tabulated::Tabulated;
 
 /// pi f from which on a law counts as peaked: a connection may then weigh this many times one to a white matt surface.
@@ -81,13 +84,37 @@ impl Reflectance {
     /// # Panics
     /// When an argument lies outside 0 ..= 1: the reader of a file checks first.
     pub fn metallic_roughness(base: Colour, metallic: f64, roughness: f64) -> Self {
+        Self::layered(base, metallic, roughness, Dielectric::PLAIN)
+    }
+
+    /// The same over another dielectric; one that reflects nothing is Lambert whatever its roughness.
+    ///
+    /// # Panics
+    /// As [`Reflectance::metallic_roughness`], and where `dielectric` is not in 0 ..= 1 or has an `f0` above its `f90`.
+    pub fn layered(base: Colour, metallic: f64, roughness: f64, dielectric: Dielectric) -> Self {
         let allowed = |x: f64| (0.0..=1.0).contains(&x);
         assert!(base.0.into_iter().all(allowed), "base colour outside 0 ..= 1: {base:?}");
         assert!(allowed(metallic) && allowed(roughness), "metallic or roughness outside 0 ..= 1");
-        if metallic == 0.0 && roughness == 1.0 {
+        let Dielectric { f0, f90 } = dielectric;
+        assert!(allowed(f90) && f0.0.into_iter().all(|f0| f0 >= 0.0 && f0 <= f90), "{dielectric:?}");
+        if metallic == 0.0 && (roughness == 1.0 || f90 == 0.0) {
             Reflectance::Lambert(base)
         } else {
-            Reflectance::Glossy(Box::new(Glossy::new(base, metallic, roughness * roughness)))
+            Self::finished(base, metallic, dielectric, &Finish::new(roughness))
+        }
+    }
+
+    /// The same of a finish that is ready, and with a specular part in any case; what it is called with is not checked again.
+    pub fn finished(base: Colour, metallic: f64, dielectric: Dielectric, finish: &Finish) -> Self {
+        Reflectance::Glossy(Box::new(Glossy::new(base, metallic, dielectric, finish.clone())))
+    }
+
+    /// The law of the same material with another base colour; only those of glTF that are matt or glossy have one.
+    pub fn with_base(&self, base: Colour) -> Self {
+        match self {
+            Reflectance::Lambert(_) => Reflectance::Lambert(base),
+            Reflectance::Glossy(law) => Reflectance::Glossy(Box::new(law.with_base(base))),
+            other => other.clone(),
         }
     }
 
