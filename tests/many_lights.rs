@@ -4,13 +4,14 @@ mod common;
 
 use common::scenes::{PLAIN, add_quad, closed_box, lambert, omni};
 use common::{Case, Comparison, Estimate, assert_all, compare, difference, failures};
+use lampyris::geometry::Ray;
 use lampyris::math::{DMat3, DVec3, PI, sin_cos};
 use lampyris::photometry::Colour;
 use lampyris::random::{Domain, Generator, Stream, sphere};
 use lampyris::scene::photometric_web::{Luminaire, Photometry, Placement};
-use lampyris::scene::{Light, Model};
-use lampyris::transport::direct::{from_lights, from_panels};
-use lampyris::transport::lamps::{all, ask, panels_of};
+use lampyris::scene::{Choice, Light, Model, Reflectance, Surface};
+use lampyris::transport::direct::{from_emitters, from_lights, from_panels};
+use lampyris::transport::lamps::{all, ask, groups_of, panels_of};
 use lampyris::transport::receiver::{Receiver, Response};
 use lampyris::transport::shared::of_lights;
 use lampyris::validate::closed_forms::polygon;
@@ -213,6 +214,36 @@ fn luminaires_with_extent_are_chosen_by_place_as_by_flux() {
         })
         .collect();
     assert_all(&all);
+}
+
+#[test]
+fn a_glossy_floor_sees_many_area_lights_as_when_they_are_chosen_by_flux() {
+    let mut model = closed_box(HALL, &lambert(0.5, 0.0));
+    let reflectance = Reflectance::metallic_roughness(Colour::grey(0.8), 1.0, 0.3);
+    // closed_box adds the floor as its third quad.
+    model.surfaces[2] = Surface { reflectance, ..lambert(0.0, 0.0) };
+    rectangles(&mut model, 150);
+    let case = Case::new(&points("p", [([1.0; 3], UP)]), model);
+    let scene = &case.scene;
+    let receiver = |x: f64| {
+        let (from, to_eye) = (scene.place([x, 1.0, 4.0]), DVec3::new(-0.8, 0.6, 0.0));
+        let hit = scene.geometry.closest_hit(&Ray { origin: from, direction: DVec3::NEG_Y }).unwrap();
+        let response = Response::reflectance(scene, (hit.primitive, hit.normal), to_eye, Colour::WHITE, 0.0);
+        assert!(response.is_peaked());
+        Receiver { position: hit.position, normal: hit.normal, response }
+    };
+    let receivers: Vec<Receiver> = [5.0, 5.3, 5.6].map(receiver).to_vec();
+    let groups = groups_of(scene, &receivers).unwrap();
+    let mut rng = random("glossy");
+    let mut estimate = |receiver: &Receiver, among: Option<&Choice>| {
+        let one = |_| from_emitters(scene, receiver, among, 64, &mut rng).luminance();
+        Estimate::from_scores((0..1000).map(one).collect::<Vec<_>>().into_iter())
+    };
+    for (i, receiver) in receivers.iter().enumerate() {
+        let both = difference(i, estimate(receiver, Some(&groups)), estimate(receiver, None));
+        assert!(both.z().is_some_and(|z| z.abs() < 6.0), "{both:?}");
+        assert!(both.estimate.standard_error < 0.02 * both.reference, "{both:?}");
+    }
 }
 
 /// Pixels and lux-meters of the hall with many lights, its floor near walls included.

@@ -1,4 +1,4 @@
-//! Which of many lights a tile of neighbouring receivers asks.
+//! Which of many lights some neighbouring receivers ask, here called a tile.
 //!
 //! Each light j has a bound B_j of what it can give anywhere in the tile, and is asked with the probability p_j = min(1, c B_j), where the
 //! p_j add up to the number of lights wanted; what it gives counts 1/p_j. The strong ones are asked for certain, and are exact.
@@ -28,8 +28,7 @@ pub type Asked = (usize, f64);
 ///
 /// A number is drawn where there is a choice.
 pub fn ask(scene: &Scene, receivers: &[Receiver], wanted: u64, rng: &mut Generator) -> Vec<Asked> {
-    let lights = scene.sources.lights.len();
-    if lights <= FEW || lights as u64 <= wanted {
+    if !is_choice(scene, wanted) {
         return all(scene);
     }
     let tile = Outlook::new(receivers);
@@ -53,6 +52,12 @@ pub fn groups_of(scene: &Scene, receivers: &[Receiver]) -> Option<Choice> {
     let groups = scene.sources.groups()?;
     let tile = Outlook::new(receivers);
     Some(Choice::new(groups.beams().iter().map(|beam| tile.bound(beam)).collect()))
+}
+
+/// True where there are more lights than are wanted, and more than few.
+pub fn is_choice(scene: &Scene, wanted: u64) -> bool {
+    let lights = scene.sources.lights.len();
+    lights > FEW && lights as u64 > wanted
 }
 
 /// All lights.

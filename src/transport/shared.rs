@@ -10,9 +10,9 @@
 //! ([`super::direct`]). Who takes part depends on places alone, so both are unbiased.
 
 use super::bodies::from_bodies;
-use super::connection::{Connected, Connectors, Link, LitPoint, Rule, Tile, connect};
+use super::connection::{Connected, Connectors, Link, LitPoint, Rule, TILE, Tile, connect};
 use super::direct::{from_afar, from_emitters, from_panels, from_some_emitters};
-use super::lamps::{Asked, ask, groups_of, panels_of};
+use super::lamps::{Asked, ask, groups_of, is_choice, panels_of};
 use super::receiver::Receiver;
 use super::sky::from_sky;
 use crate::geometry::Ray;
@@ -27,6 +27,8 @@ use std::ops::Range;
 
 /// Nearer than this to the centre, in lengths of its longest edge, an emitter is sampled for each receiver alone.
 const NEAR: f64 = 1.0;
+/// Receivers that ask the same of many lights: fewer know better which, more share the search for what hides them.
+const ASKING_TOGETHER: usize = 64;
 /// Points whose light is summed in f32 before it goes into f64.
 pub const TOGETHER: usize = 16;
 
@@ -126,14 +128,20 @@ pub fn direct_light(
     (lamps, channels): (u64, usize),
 ) -> Vec<Colour> {
     let places: Vec<Receiver> = receivers.iter().map(|(r, _)| *r).collect();
-    let Some((_, first)) = receivers.first_mut() else { return Vec::new() };
-    let asked = if lamps > 0 { ask(scene, &places, lamps, first) } else { Vec::new() };
-    let mut light = of_lights(scene, &places, &asked);
-    let panels = panels_of(scene, &places);
-    for ((receiver, rng), light) in receivers.iter_mut().zip(&mut light) {
-        *light += from_panels(scene, receiver, &panels, samples, rng);
-        *light += from_bodies(scene, receiver, samples, rng);
-        *light += from_sky(scene, receiver, samples, rng);
+    let together = if is_choice(scene, lamps) { ASKING_TOGETHER } else { TILE };
+    let mut light: Vec<Colour> = Vec::with_capacity(places.len());
+    for (places, receivers) in places.chunks(together).zip(receivers.chunks_mut(together)) {
+        let asked = if lamps > 0 { ask(scene, places, lamps, receivers[0].1) } else { Vec::new() };
+        light.extend(of_lights(scene, places, &asked));
+    }
+    let chunks = places.chunks(BUNDLE).zip(receivers.chunks_mut(BUNDLE)).zip(light.chunks_mut(BUNDLE));
+    for ((places, receivers), light) in chunks {
+        let panels = panels_of(scene, places);
+        for ((receiver, rng), light) in receivers.iter_mut().zip(light) {
+            *light += from_panels(scene, receiver, &panels, samples, rng);
+            *light += from_bodies(scene, receiver, samples, rng);
+            *light += from_sky(scene, receiver, samples, rng);
+        }
     }
     if scene.sources.emitters.is_empty() {
         return light;

@@ -81,9 +81,9 @@ fn asymmetric_file() -> String {
     format!("IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 7 5 1 2 0 0 0\n1 1 20\n{angles}\n{planes}\n{}\n", rows.join("\n"))
 }
 
-/// The web at (0, 3, 0), C0 along +X, C90 along -Z.
-fn asymmetric(model: Model) -> Result<Model> {
-    hang(model, &asymmetric_file(), "position = [0.0, 3.0, 0.0]\n")
+/// The web at `position`, C0 along +X, C90 along -Z.
+fn asymmetric(model: Model, position: [f64; 3]) -> Result<Model> {
+    hang(model, &asymmetric_file(), &format!("position = {position:?}\n"))
 }
 
 fn floor() -> Model {
@@ -110,7 +110,7 @@ fn asymmetric_web() -> Result<Vec<Comparison>> {
         [3.0 * sin / cos * cos_c, 0.0, -3.0 * sin / cos * sin_c]
     };
     let job = run(1, 16) + &points("p", asked.iter().map(|&(_, c, gamma, _)| (foot(c, gamma), UP)));
-    let found = Experiment::new(&job, asymmetric(floor())?)?.values();
+    let found = Experiment::new(&job, asymmetric(floor(), [0.0, 3.0, 0.0])?)?.values();
     let exact = |gamma: f64, intensity: f64| {
         let c = cos(gamma * degrees);
         intensity * c * c * c / 9.0
@@ -134,7 +134,7 @@ fn asymmetric_flux() -> Result<Vec<Comparison>> {
     let exact = (0..cells).map(cell).sum();
     let walls = closed_box(DVec3::new(4.0, 4.0, 4.0), &lambert(0.0, 0.0));
     let job = run(64, 16) + &point("p", UP, UP);
-    let (_, batches) = Experiment::new(&job, asymmetric(walls)?)?.batches(1..2);
+    let (_, batches) = Experiment::new(&job, asymmetric(walls, [1.5, 3.0, 2.2])?)?.batches(1..2);
     Ok(vec![Comparison::new("absorbed by the walls", "lm", flux(&batches, "absorbed"), exact).within(1e-6)])
 }
 

@@ -26,6 +26,8 @@ const CORNERS: [[f32; 3]; 8] = [
 ];
 const CUBE: [u16; 36] =
     [0, 2, 1, 0, 3, 2, 4, 5, 6, 4, 6, 7, 0, 1, 5, 0, 5, 4, 3, 6, 2, 3, 7, 6, 0, 4, 7, 0, 7, 3, 1, 2, 6, 1, 6, 5];
+/// Corners, triangles, and whether it is flat.
+type Mesh<'a> = (&'a [[f32; 3]], &'a [u16], bool);
 /// Size of the lamp \[m\].
 const SIZE: [f64; 3] = [0.4, 0.1, 0.2];
 
@@ -67,8 +69,7 @@ fn a_mesh_shines_with_intensity_over_the_area_it_shows() {
     inside_out.chunks_mut(3).for_each(|t| t.swap(1, 2));
     let sheet = [[-0.5, 0.0, -0.5], [0.5, 0.0, -0.5], [0.5, 0.0, 0.5], [-0.5, 0.0, 0.5]];
     let flat: [u16; 6] = [0, 1, 2, 0, 2, 3];
-    let meshes: [(&[[f32; 3]], &[u16], bool); 3] =
-        [(&CORNERS, &CUBE, false), (&CORNERS, &inside_out, false), (&sheet, &flat, true)];
+    let meshes: [Mesh; 3] = [(&CORNERS, &CUBE, false), (&CORNERS, &inside_out, false), (&sheet, &flat, true)];
     for (corners, triangles, is_flat) in meshes {
         let scene = shining(corners, triangles);
         assert_eq!((scene.sources.len(), scene.sources.panels.len()), (1, 1));
