@@ -263,14 +263,15 @@ mod tests {
         let triangles: Vec<[Vec3; 3]> = [sheet(1, 0.0), sheet(1, 1.0), sheet(1, -1.0)].concat();
         let veils = [true, true, false, false, true, true];
         let geometry = Geometry::veiled(&triangles, &veils, Build::Quick);
+        // In micrometres: a ray from beyond the mesh rounds once more.
         let hit = |y: f64, up: f64| {
             let ray = super::super::Ray { origin: DVec3::new(0.1, y, 0.2), direction: DVec3::Y * up };
-            geometry.closest_hit(&ray).map(|hit| (hit.primitive / 2, hit.distance))
+            geometry.closest_hit(&ray).map(|hit| (hit.primitive / 2, (1e6 * hit.distance + 0.5) as u32))
         };
-        assert_eq!(hit(0.5, -1.0), Some((0, 0.5)));
-        assert_eq!(hit(0.5, 1.0), Some((1, 0.5)));
-        assert_eq!(hit(-0.5, -1.0), Some((2, 0.5)));
-        assert_eq!(hit(2.0, -1.0), Some((1, 1.0)));
+        assert_eq!(hit(0.5, -1.0), Some((0, 500_000)));
+        assert_eq!(hit(0.5, 1.0), Some((1, 500_000)));
+        assert_eq!(hit(-0.5, -1.0), Some((2, 500_000)));
+        assert_eq!(hit(2.0, -1.0), Some((1, 1_000_000)));
         assert_eq!(hit(-2.0, -1.0), None);
         let at = |y: f32| Vec3::new(0.1, y, 0.2);
         assert!(geometry.visible(at(-2.0), at(0.9)) && !geometry.visible(at(0.5), at(1.5)));

@@ -87,7 +87,7 @@ fn every_kind_runs_and_says_what_it_reflects() {
     let (code, text, said) = run("reflectance", &materials);
     assert_eq!(code, Some(0), "{said}");
     let row = |name: &str| text.lines().find(|line| line.starts_with(name)).unwrap_or_else(|| panic!("{name}: {text}"));
-    assert!(row("globe").contains(" 0.4500") && text.contains("transmits     0.5000"), "{text}");
+    assert!(row("globe").contains(" 0.4500") && text.contains("transmits    0.5000"), "{text}");
     assert!(row("walls").contains(" 0.3142") && row("ball").contains(" 0.04000"), "{text}");
     assert!(row("screen").contains("reflects"), "{text}");
     let (code, text, said) = run("run", &materials);

@@ -69,7 +69,6 @@ fn job(estimator: &str, histories: u32) -> String {
         "[run]\nbatches = 64\nhistories_per_batch = {histories}\nseed = 6\n[transport]\nestimator = \"{estimator}\"\n"
     ) + &spot_camera("cover", [0.5, 0.1, 0.5], [0.5, 0.4, 0.52], [1.0, 0.0, 0.0])
         + &spot_camera("floor", [0.9, 0.5, 0.5], [0.7, 0.0, 0.5], [1.0, 0.0, 0.0])
-        + &point("below", [0.5, 0.0, 0.5], UP)
 }
 
 #[test]
@@ -77,8 +76,8 @@ fn estimators_agree_under_an_opal_luminaire() {
     let means = |estimator: &str, histories: u32| -> Vec<Estimate> {
         Case::new(&job(estimator, histories), luminaire()).values()
     };
-    let (local, reverse) = (means("local", 1024), means("reverse", 12288));
-    let names = ["cover", "floor", "below"];
+    let (local, reverse) = (means("local", 512), means("reverse", 8192));
+    let names = ["cover", "floor"];
     let all = names.iter().zip(local).zip(reverse).map(|((name, a), b)| difference(name, a, b));
     assert_all(&all.collect::<Vec<_>>());
 }

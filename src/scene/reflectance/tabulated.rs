@@ -52,7 +52,7 @@ fn place(nodes: &[f64], x: f64) -> Place {
 }
 
 impl Tabulated {
-    /// The law of `values` [1/sr] by polar angle, polar angle and azimuth, the same both ways.
+    /// The law of `values` \[1/sr\] by polar angle, polar angle and azimuth, the same both ways.
     fn new(polar: Vec<f64>, azimuths: Vec<f64>, values: Vec<Colour>) -> Self {
         let mut table = Table { polar, azimuths, values, albedos: Vec::new(), sums: Vec::new() };
         for i in 0..table.polar.len() {
