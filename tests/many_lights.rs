@@ -228,7 +228,8 @@ fn a_glossy_floor_sees_many_area_lights_as_when_they_are_chosen_by_flux() {
     let receiver = |x: f64| {
         let (from, to_eye) = (scene.place([x, 1.0, 4.0]), DVec3::new(-0.8, 0.6, 0.0));
         let hit = scene.geometry.closest_hit(&Ray { origin: from, direction: DVec3::NEG_Y }).unwrap();
-        let response = Response::reflectance(scene, (hit.primitive, hit.normal), to_eye, Colour::WHITE, 0.0);
+        let response =
+            Response::reflectance(scene, (hit.primitive, hit.position, hit.normal), to_eye, Colour::WHITE, 0.0);
         assert!(response.is_peaked());
         Receiver { position: hit.position, normal: hit.normal, response }
     };
