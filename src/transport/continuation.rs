@@ -46,7 +46,7 @@ pub struct Continuation {
     /// matt \[lx or cd/m2\]. What they really reflect of it has this order of magnitude and comes in spikes: no
     /// direction can be drawn towards such a source, so that its image in a narrow lobe is met by chance alone.
     pub caustic: f64,
-    /// True where y_1 and the receiver are matt, in a scene without veils: y_1 then counts in full, as [`super::neighbours`] wants it.
+    /// True where y_1 is drawn for neighbours as well: it then counts in full, as [`super::neighbours`] wants it.
     pub shared: bool,
 }
 
@@ -60,12 +60,18 @@ pub fn is_due(scene: &Scene, receiver: &Receiver, bound: f64) -> bool {
             || scene.geometry.may_exceed(receiver.position, receiver.normal, bound))
 }
 
-/// Draws a path from `receiver`.
-pub fn continue_from(scene: &Scene, receiver: &Receiver, bound: f64, rng: &mut Generator) -> Continuation {
+/// Draws a path from `receiver`; where it `may_share` y_1, and both are matt, y_1 is drawn for its neighbours as well.
+pub fn continue_from(
+    scene: &Scene,
+    receiver: &Receiver,
+    bound: f64,
+    may_share: bool,
+    rng: &mut Generator,
+) -> Continuation {
     let mut path = Continuation::default();
     let Some((mut weight, mut found)) = step(scene, receiver, bound, rng) else { return path };
-    let may_share = receiver.response.constant(scene, receiver.normal).is_some() && !scene.geometry.has_veils();
-    path.shared = may_share && found.is_matt(scene);
+    let is_matt = receiver.response.constant(scene, receiver.normal).is_some() && found.is_matt(scene);
+    path.shared = may_share && is_matt;
     if path.shared {
         (weight, found.carried) = (Colour::WHITE, 0.0);
     }

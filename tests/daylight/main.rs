@@ -5,6 +5,7 @@ mod common;
 
 mod bad;
 mod factor;
+mod glazing;
 mod light;
 mod rooms;
 mod skies;

@@ -47,7 +47,7 @@ impl Block<'_> {
     /// Draws the continuations of the receivers that need them, and adds the light that comes by them.
     pub(super) fn add_continuations(&self, sensed: &[Sensed], scores: &mut [Score]) {
         let all = self.histories.histories();
-        let may_share = self.set.shape().bins() >= GROUP && !self.scene.has_peaks() && !self.scene.geometry.has_veils();
+        let may_share = self.may_share();
         let groups = (all / HISTORIES_OF_A_PATH[usize::from(may_share)]).max(1);
         let of_bin = |i: usize| {
             let both = [sensed[i].receiver, sensed[i].behind].into_iter().flatten();
@@ -63,7 +63,7 @@ impl Block<'_> {
         let lit = self.set.lit_points_of_continuations(self.scene, self.batch, groups);
         for group in 0..groups {
             let histories = group * all / groups..(group + 1) * all / groups;
-            let paths: Vec<Path> = continued.par_iter_mut().map(|c| self.draw(c)).collect();
+            let paths: Vec<Path> = continued.par_iter_mut().map(|c| self.draw(c, may_share)).collect();
             let light = self.light(&continued, &paths, &lit, group, histories.clone());
             let some = neighbourhoods.par_iter().zip(continued.par_chunks(GROUP));
             let some = some.zip(paths.par_chunks(GROUP).zip(light.par_chunks(GROUP)));
@@ -88,9 +88,14 @@ impl Block<'_> {
         })
     }
 
-    fn draw(&self, continued: &mut Continued) -> Path {
+    /// True where receivers have neighbours, and these could have found any point that one of them finds in the same way.
+    fn may_share(&self) -> bool {
+        self.set.shape().bins() >= GROUP && !self.scene.has_peaks() && !self.scene.geometry.has_veils()
+    }
+
+    fn draw(&self, continued: &mut Continued, may_share: bool) -> Path {
         let rng = continued.paths.next();
-        let continuation = continue_from(self.scene, &continued.receiver, self.rule.bound, rng);
+        let continuation = continue_from(self.scene, &continued.receiver, self.rule.bound, may_share, rng);
         Path { continuation, rng: rng.clone() }
     }
 
