@@ -153,7 +153,7 @@ fn check_opening(c: &Checker, field: &str, corners: &[[f64; 3]]) -> Result<()> {
     for (i, &corner) in corners.iter().enumerate() {
         c.position(&format!("{field}[{i}]"), corner)?;
     }
-    let allowed = "a flat convex polygon that has an area";
+    let allowed = "a flat convex polygon that has an area, each corner given once";
     c.that(field, format!("{corners:?}"), is_flat_and_convex(corners), allowed)
 }
 
@@ -167,6 +167,10 @@ fn is_flat_and_convex(corners: &[[f64; 3]]) -> bool {
     });
     let area = length(sum);
     if area.is_nan() || area <= 1e-9 * size * size {
+        return false;
+    }
+    let differ = |i: usize| corners[..i].iter().all(|&p| length(minus(p, corners[i])) > 1e-6 * size);
+    if !(1..count).all(differ) {
         return false;
     }
     let normal = sum.map(|x| x / area);

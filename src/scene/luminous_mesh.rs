@@ -64,6 +64,7 @@ impl Model {
         keep(&mut self.surface_of);
         let mut flags = kept.iter();
         self.triangles.retain(|_| *flags.next().expect("a flag for each"));
+        self.textures.charts.retain(&kept);
         self.drop_unused_vertices();
     }
 }

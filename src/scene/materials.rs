@@ -23,8 +23,10 @@ impl Model {
         let both = law.sides().is_some() || matches!(law, Reflectance::Delta(Delta::Pane(_) | Delta::Glass(_)));
         for number in self.surfaces_called((job, at), material.name())? {
             let surface = &mut self.surfaces[number];
-            if both && matches!(law, Reflectance::Delta(_)) && !surface.emission.is_black() {
-                return Err(Error::input(job, format!("{at}.name"), material.name(), "glass on what does not emit"));
+            let one_sided = matches!(law, Reflectance::Delta(_)) || !surface.double_sided;
+            if both && one_sided && !surface.emission.is_black() {
+                let allowed = "glass on what does not emit, opal on what does not or emits on both sides";
+                return Err(Error::input(job, format!("{at}.name"), material.name(), allowed));
             }
             surface.reflectance = law.clone();
             self.textures.make_uniform(number);

@@ -109,6 +109,10 @@ impl Scene {
         let is_veil =
             |(triangle, &s): (u32, &u32)| surfaces[s as usize].is_veil() || model.textures.is_veil(s, triangle);
         let veils: Vec<bool> = (0..).zip(&surface_of).map(is_veil).collect();
+        if let Some(veil) = model.replacements.iter().find(|r| surfaces[r.surface as usize].is_veil()) {
+            let name = &surfaces[veil.surface as usize].name;
+            return Err(Error::input("scene", "[[replace]]", name, "a material that is no pane: panes are triangles"));
+        }
         let harmonics = model.replacements.iter().map(|r| r.harmonic.clone().moved(offset)).collect();
         let geometry = Geometry::veiled(&corners, &veils, build)
             .with_quadrics(spheres(job, offset), planes(job, offset))

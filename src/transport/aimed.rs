@@ -28,7 +28,8 @@ pub fn scatter(scene: &Scene, hit: &Hit, w_in: DVec3, rng: &mut Generator) -> Op
     if reflectance.has_delta() || reflectance.sides().is_some() {
         return scene.scatter(hit, w_in, rng).map(|scattered| (scattered, false));
     }
-    let aim = Aim::new(scene.openings(), hit.position);
+    // From where the ray will start: in the plane of an opening there is no direction to it.
+    let aim = Aim::new(scene.openings(), scene.geometry.lift(hit.position, hit.normal));
     let choice = rng.uniform();
     let direction = if choice < 0.5 {
         aim.direction(2.0 * choice, rng.uniform2())
@@ -41,6 +42,9 @@ pub fn scatter(scene: &Scene, hit: &Hit, w_in: DVec3, rng: &mut Generator) -> Op
     }
     let through = aim.density(direction);
     let density = 0.5 * (reflectance.pdf(hit.normal, w_in, direction) + through);
+    if density <= 0.0 {
+        return None;
+    }
     let factor = reflectance.evaluate(hit.normal, w_in, direction) * (cosine / density);
     Some((Scattered { direction, factor, delta: false, transmitted: false }, through > 0.0))
 }

@@ -65,18 +65,23 @@ pub fn all(scene: &Scene) -> Vec<Asked> {
     (0..scene.sources.lights.len()).map(|light| (light, 1.0)).collect()
 }
 
-/// All lights, or some of many chosen in proportion to flux alone: cheap, for one receiver, where a rough mean is enough.
+/// All lights, or of many the parallel ones and some of the others chosen in proportion to flux alone: cheap, for one receiver, where a
+/// rough mean is enough.
 pub fn some_by_flux(scene: &Scene, rng: &mut Generator) -> Vec<Asked> {
     if scene.sources.lights.len() <= FEW {
         return all(scene);
     }
-    let among = scene.sources.lights_by_flux();
+    let (among, beams) = (scene.sources.lights_by_flux(), scene.sources.beams());
+    let parallel = (0..beams.len()).filter(|&light| beams[light].is_none()).map(|light| (light, 1.0));
+    let mut asked: Vec<Asked> = parallel.collect();
     let u = rng.uniform();
-    let chosen = (0..ROUGHLY).map(|k| {
+    for k in 0..if among.all() > 0.0 { ROUGHLY } else { 0 } {
         let (light, _) = among.choose((f64::from(k) + u) / f64::from(ROUGHLY));
-        (light, 1.0 / (f64::from(ROUGHLY) * among.probability(light)))
-    });
-    chosen.collect()
+        if beams[light].is_some() {
+            asked.push((light, 1.0 / (f64::from(ROUGHLY) * among.probability(light))));
+        }
+    }
+    asked
 }
 
 /// The probabilities for `bounds`, in proportion to them and at most 1, that add up to `wanted`: infinite bounds are certain besides.

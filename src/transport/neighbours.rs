@@ -25,7 +25,7 @@ pub const GROUP: usize = 64;
 /// A group of neighbouring receivers.
 pub struct Neighbours {
     places: Vec<(DVec3, DVec3)>,
-    /// g_0 of each; None where it is not matt and takes no part.
+    /// g_0 of each; None where it is not matt, or black, so that it draws nothing and takes no part.
     responses: Vec<Option<Colour>>,
     lifted: Points,
     bound: f64,
@@ -34,8 +34,9 @@ pub struct Neighbours {
 impl Neighbours {
     /// The group of `receivers`, at most [`GROUP`], with the bound b of the kernel \[1/m2\].
     pub fn new<'a>(scene: &Scene, receivers: impl Iterator<Item = &'a Receiver>, bound: f64) -> Self {
-        let (places, responses): (Vec<_>, Vec<_>) =
-            receivers.map(|r| ((r.position, r.normal), r.response.constant(scene, r.normal))).unzip();
+        let (places, responses): (Vec<_>, Vec<_>) = receivers
+            .map(|r| ((r.position, r.normal), r.response.constant(scene, r.normal).filter(|g| !g.is_black())))
+            .unzip();
         assert!(places.len() <= GROUP, "a group has {GROUP} receivers");
         let lift = |(position, normal): &(DVec3, DVec3)| scene.geometry.lift(*position, *normal).as_vec3();
         let lifted: Vec<Vec3> = places.iter().map(lift).collect();

@@ -114,6 +114,11 @@ impl<'a> Materials<'a> {
         let colour = Colour([r, g, b]);
         let [_, green, blue, _] = data.mean;
         let glass = glass(self.file, material, (path, name), colour * rgb(base.mean), warnings)?;
+        let emits = !(emission * rgb(glow.mean)).is_black();
+        if emits && glass.is_some() {
+            warnings.add(format!("material `{name}`: it is opaque, as it emits: glass does not"));
+        }
+        let glass = glass.filter(|_| !emits);
         let is_glass = glass.is_some();
         let reflectance = glass.unwrap_or_else(|| {
             Reflectance::layered(colour * rgb(base.mean), metallic * blue, roughness * green, dielectric)

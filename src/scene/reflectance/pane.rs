@@ -46,6 +46,9 @@ impl Pane {
     /// Shares of light at the cosine of incidence that are let through and mirrored, together at most 1.
     pub fn shares(&self, cosine: f64) -> (Colour, Colour) {
         let Some(face) = face(self.index, cosine) else { return (Colour::BLACK, Colour::WHITE) };
+        if face.reflectances.contains(&1.0) {
+            return (Colour::BLACK, Colour::WHITE);
+        }
         let crossed = self.internal.map(|t0| if t0 == 1.0 { 1.0 } else { crate::math::pow(t0, 1.0 / face.inside) });
         let [s, p] = face.reflectances.map(|rho| {
             let through = crossed.map(|t| (1.0 - rho) * (1.0 - rho) * t / (1.0 - rho * rho * t * t));

@@ -117,7 +117,8 @@ impl Textures {
             if let Some(layer) = &textured.data_layer {
                 let (low, high) = layer.image.range(1);
                 let step = |green: f64| step_of(textured.factors[1] * green);
-                wanted[step(low)..=step(high)].fill(true);
+                // Blending may round beyond either.
+                wanted[step(low).saturating_sub(1)..=(step(high) + 1).min(STEPS as usize)].fill(true);
             }
         }
         let finish = |(step, wanted): (usize, bool)| wanted.then(|| Finish::new(step as f64 / STEPS));
