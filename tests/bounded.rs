@@ -267,8 +267,10 @@ fn a_point_found_by_one_receiver_counts_at_all_that_see_it_as_near() {
     let case = Case::new(&job, closed_box(DVec3::ONE, &lambert(0.5, 1.0 / PI)));
     let y = meter([0.0, 0.1, 0.4], DVec3::X);
     let floor = |x: f64, z: f64| meter([x, 0.0, z], DVec3::Y);
-    // Below the floor, and farther away than the bound reaches.
-    let others = [meter([0.1, 0.0, 0.4], DVec3::NEG_Y), floor(0.9, 0.9)];
+    // Below the floor, farther away than the bound reaches, and one that looks in vain for light.
+    let black = Response::reflectance(&case.scene, (0, DVec3::ZERO, DVec3::Y), DVec3::Y, Colour::BLACK, 0.0);
+    let others =
+        [meter([0.1, 0.0, 0.4], DVec3::NEG_Y), floor(0.9, 0.9), Receiver { response: black, ..floor(0.1, 0.42) }];
     let near = [floor(0.1, 0.4), floor(0.02, 0.45), floor(0.2, 0.3)];
     let bound = 1.0;
     let factor = |r: &Receiver| {

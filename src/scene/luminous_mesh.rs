@@ -108,3 +108,20 @@ impl LuminousMesh {
 fn area_vector([a, b, c]: &Triangle) -> DVec3 {
     (b - a).cross(c - a)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn textures_stay_on_the_triangles_that_are_left() {
+        let triangles = vec![[0, 1, 2], [1, 2, 3], [2, 3, 4]];
+        let mut model = Model { positions: vec![DVec3::ZERO; 5], triangles, ..Model::default() };
+        (model.surface_of, model.nodes.of_triangle) = (vec![7, 8, 9], vec![0, 1, 2]);
+        let corner = [0.5, 0.25];
+        model.textures.charts.push(2, [&corner; 3]);
+        model.remove_triangles(&[0]);
+        assert_eq!((&model.surface_of[..], &model.nodes.of_triangle[..]), (&[8, 9][..], &[1, 2][..]));
+        assert_eq!([0, 1, 2].map(|t| model.textures.charts.has(t)), [false, true, false]);
+    }
+}

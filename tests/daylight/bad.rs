@@ -56,6 +56,9 @@ fn openings_that_are_no_flat_convex_polygons_are_refused() {
         // A star: every corner turns the same way, but twice around.
         "[0, 1, 0], [0.59, -0.81, 0], [-0.95, 0.31, 0], [0.95, 0.31, 0], [-0.59, -0.81, 0]",
         "[0, 0, 0], [1e7, 0, 0], [0, 1, 0]",
+        // Closed with its first corner, and listed twice.
+        "[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 1e-13, 0]",
+        "[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]",
     ] {
         refused(&opening(wrong), &["opening[0].corners"]);
     }

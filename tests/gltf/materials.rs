@@ -202,6 +202,11 @@ fn what_transmits_is_glass() {
     assert_close(body.left(1.0), [0.5, 1.0, 1.0]);
     assert!(!model.surfaces[0].is_veil());
 
+    let mut lit = glass(clear.clone(), 0.0);
+    lit.json["materials"][0]["emissiveFactor"] = json!([1.0, 1.0, 1.0]);
+    let model = good(&lit);
+    assert!(warns(&model, "as it emits") && !model.surfaces[0].is_veil());
+
     let some = json!({ "KHR_materials_transmission": { "transmissionFactor": 0.5 } });
     assert!(warns(&good(&glass(some, 0.0)), "it is opaque"));
     let none = json!({ "KHR_materials_transmission": {} });
