@@ -6,8 +6,9 @@ use crate::farm::plan::Plan;
 
 /// What a process takes beside what the plan counts \[bytes\].
 const MARGIN: u64 = 256 << 20;
-/// The merge waits so long for files that it does not see yet \[s\]: NFS forgets what it remembers after 60 s at most.
-const LATE: u64 = 90;
+/// The merge waits so long for files that it does not see yet \[s\], and a third of its own time at most: NFS forgets what it
+/// remembers after 60 s at most.
+const LATE: u64 = 70;
 
 /// A batch script and where it belongs.
 #[derive(Clone, Debug)]
@@ -51,8 +52,9 @@ pub(super) fn merge(root: &str, program: &str, plan: &Plan, time: TimeLimit, ext
 #   sbatch --dependency=afterany:<job of the shards> {script}
 {head}
 # What other nodes have written a network file system may show a minute late.
-exec {program} merge {folder} --wait {LATE}
+exec {program} merge {folder} --wait {late}
 ",
+        late = LATE.min(time.0 / 3),
         script = quoted(&path),
         folder = quoted(root),
     );
@@ -109,6 +111,8 @@ mod tests {
             assert!(lines.contains(&line), "{line}\n{}", script.text);
         }
         let merge = merge("/data/a b", "lampyris", &plan(), time, &extra);
-        assert!(merge.text.ends_with("exec lampyris merge '/data/a b' --wait 90\n") && !merge.text.contains("signal"));
+        let short = super::merge("/data", "lampyris", &plan(), TimeLimit(60), &[]);
+        assert!(short.text.ends_with("--wait 20\n"));
+        assert!(merge.text.ends_with("exec lampyris merge '/data/a b' --wait 70\n") && !merge.text.contains("signal"));
     }
 }

@@ -40,7 +40,7 @@ const POLL: Duration = Duration::from_millis(200);
 /// Time between two visits to the copies, at least.
 const VISIT: Duration = Duration::from_secs(5);
 /// What hosts have written into the folder may be seen here so much later: NFS forgets what it remembers after 60 s at most.
-const LATE: Duration = Duration::from_secs(90);
+const LATE: Duration = Duration::from_secs(70);
 /// A worker whose connection ends has this long to write its checkpoint \[ms\].
 const GRACE: &str = "TERM,10000,KILL,25";
 /// Of the log this much is shown when a round was in vain \[bytes\].
