@@ -45,7 +45,7 @@ pub struct Sky {
 
 /// Distribution of the luminance of the sky.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "allowed: \"uniform\", \"overcast\" or 1 .. 15, a type of the CIE standard general sky")]
 pub enum SkyModel {
     /// Type 1 ..= 15 of the CIE standard general sky (CIE S 011, ISO 15469).
     Standard(u8),
