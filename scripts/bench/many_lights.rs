@@ -7,14 +7,14 @@
 
 mod common;
 
-use common::thread_time;
+use common::{Reached, reach, thread_time};
 use lampyris::farm::pilot::bounds;
 use lampyris::farm::realization::Realization;
 use lampyris::job::Job;
 use lampyris::math::{DVec3, PI};
 use lampyris::scene::photometric_web::Photometry;
 use lampyris::scene::{Model, Scene};
-use lampyris::tally::statistics::{Estimate, figure_of_merit, median};
+use lampyris::tally::statistics::{figure_of_merit, median};
 use lampyris::validate::scenes::{add_quad, box_walls, closed_box, lambert};
 
 const SEEDS: u64 = 3;
@@ -126,18 +126,6 @@ fn run(kind: &str, number: u32, job: &str, seed: u64) -> [f64; 5] {
     let start = thread_time();
     let realization = Realization::new(&job, &scene, &bounds(&job, &scene));
     let before = (thread_time() - start).as_secs_f64();
-    let start = thread_time();
-    let scores: Vec<_> = (0..job.run.batches).map(|i| realization.batch(i)).collect();
-    let seconds = (thread_time() - start).as_secs_f64();
-    let bins = scores[0].sets[0].value.len();
-    let fixed = &realization.fixed_direct()[0];
-    let error = |bin: usize| {
-        let estimate = Estimate::from_scores(scores.iter().map(|s| s.sets[0].value[bin]));
-        Some(estimate.with_fixed(fixed, bin)?.relative_error()).filter(|r| r.is_finite())
-    };
-    let errors: Vec<f64> = (0..bins).filter_map(error).collect();
-    let relative = (errors.iter().map(|r| r * r).sum::<f64>() / errors.len() as f64).sqrt();
-    let worst = errors.iter().fold(0.0, |a, &b| f64::max(a, b));
-    let histories = job.run.histories_per_batch * job.run.batches;
-    [before, seconds / (histories * bins as u64) as f64, relative, worst, figure_of_merit(relative, seconds)]
+    let Reached { seconds, of_a_bin, relative_error, worst } = reach(&realization, &job);
+    [before, of_a_bin, relative_error, worst, figure_of_merit(relative_error, seconds)]
 }

@@ -6,12 +6,12 @@
 
 mod common;
 
-use common::thread_time;
+use common::{Reached, reach};
 use lampyris::farm::pilot::bounds;
 use lampyris::farm::realization::Realization;
 use lampyris::job::Job;
 use lampyris::scene::{Model, Scene, gltf};
-use lampyris::tally::statistics::{Estimate, figure_of_merit, median};
+use lampyris::tally::statistics::{figure_of_merit, median};
 use std::path::Path;
 
 const SEEDS: u64 = 3;
@@ -79,18 +79,6 @@ fn run(model: &Model, job: &mut Job, seed: u64) -> [f64; 4] {
     job.run.seed = seed;
     let scene = Scene::new(model.clone(), job).expect("the scene is right");
     let realization = Realization::new(job, &scene, &bounds(job, &scene));
-    let start = thread_time();
-    let scores: Vec<_> = (0..job.run.batches).map(|i| realization.batch(i)).collect();
-    let seconds = (thread_time() - start).as_secs_f64();
-    let bins = scores[0].sets[0].value.len();
-    let fixed = &realization.fixed_direct()[0];
-    let error = |bin: usize| {
-        let estimate = Estimate::from_scores(scores.iter().map(|s| s.sets[0].value[bin]));
-        Some(estimate.with_fixed(fixed, bin)?.relative_error()).filter(|r| r.is_finite())
-    };
-    let errors: Vec<f64> = (0..bins).filter_map(error).collect();
-    let relative = (errors.iter().map(|r| r * r).sum::<f64>() / errors.len() as f64).sqrt();
-    let worst = errors.iter().fold(0.0, |a, &b| f64::max(a, b));
-    let histories = job.run.histories_per_batch * job.run.batches;
-    [seconds / (histories * bins as u64) as f64, relative, worst, figure_of_merit(relative, seconds)]
+    let Reached { seconds, of_a_bin, relative_error, worst } = reach(&realization, job);
+    [of_a_bin, relative_error, worst, figure_of_merit(relative_error, seconds)]
 }

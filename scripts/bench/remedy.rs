@@ -6,10 +6,10 @@
 
 mod common;
 
-use common::{load, prepare, thread_time};
+use common::{Reached, load, prepare, reach};
 use lampyris::farm::pilot::bounds;
 use lampyris::farm::realization::Realization;
-use lampyris::tally::statistics::{Estimate, figure_of_merit, median};
+use lampyris::tally::statistics::{figure_of_merit, median};
 
 /// Histories of a run, over all batches.
 const HISTORIES: u64 = 8192;
@@ -50,15 +50,6 @@ const TASKS: [Task; 4] = [
         sizes: &[64, 256, 512],
     },
 ];
-
-/// What one run reached.
-struct Reached {
-    /// CPU seconds of the run, and of one history and bin.
-    seconds: f64,
-    of_a_bin: f64,
-    relative_error: f64,
-    worst: f64,
-}
 
 fn main() {
     let quick = std::env::args().any(|a| a == "--quick");
@@ -105,21 +96,5 @@ fn run(task: &Task, size: u64, seed: u64, bounded: bool) -> Reached {
     );
     let (job, scene) = prepare(&text, load(task.scene));
     let realization = Realization::new(&job, &scene, &bounds(&job, &scene));
-    let start = thread_time();
-    let scores: Vec<_> = (0..batches).map(|i| realization.batch(i)).collect();
-    let seconds = (thread_time() - start).as_secs_f64();
-    let bins = scores[0].sets[0].value.len();
-    let fixed = &realization.fixed_direct()[0];
-    let error = |bin: usize| {
-        let estimate = Estimate::from_scores(scores.iter().map(|s| s.sets[0].value[bin]));
-        Some(estimate.with_fixed(fixed, bin)?.relative_error()).filter(|r| r.is_finite())
-    };
-    let errors: Vec<f64> = (0..bins).filter_map(error).collect();
-    let mean_square = errors.iter().map(|r| r * r).sum::<f64>() / errors.len() as f64;
-    Reached {
-        seconds,
-        of_a_bin: seconds / (HISTORIES * bins as u64) as f64,
-        relative_error: mean_square.sqrt(),
-        worst: errors.iter().fold(0.0, |a, &b| f64::max(a, b)),
-    }
+    reach(&realization, &job)
 }

@@ -167,13 +167,16 @@ fn furnished(
     Ok(model)
 }
 
+/// The bytes of the file `name` beside the job at `job_path`, which names it in `field`; `what` says what it shall be.
+fn read_named(job_path: &Path, field: &str, name: &str, what: &str) -> Result<Vec<u8>> {
+    let path = job_path.parent().unwrap_or(Path::new("")).join(name);
+    fs::read(&path)
+        .map_err(|e| Error::input(job_path.display(), field, name, format!("{what}, relative to the job file ({e})")))
+}
+
 /// Reads the file `name` of the series of `[[replace]]` number `i` of the job at `job_path`, and adds it to `files`.
 fn read_series(job_path: &Path, i: usize, name: &str, files: &mut Vec<(Input, Vec<u8>)>) -> Result<File> {
-    let path = job_path.parent().unwrap_or(Path::new("")).join(name);
-    let bytes = fs::read(&path).map_err(|e| {
-        let allowed = format!("a .harmonic file, relative to the job file ({e})");
-        Error::input(job_path.display(), format!("replace[{i}].harmonic"), name, allowed)
-    })?;
+    let bytes = read_named(job_path, &format!("replace[{i}].harmonic"), name, "a .harmonic file")?;
     let file = File::parse(name, &bytes)?;
     files.push((Input::of(name, &bytes), bytes));
     Ok(file)
@@ -181,11 +184,7 @@ fn read_series(job_path: &Path, i: usize, name: &str, files: &mut Vec<(Input, Ve
 
 /// Reads the table `name` of `[[material]]` number `i` of the job at `job_path`, and adds it to `files`.
 fn read_table(job_path: &Path, i: usize, name: &str, files: &mut Vec<(Input, Vec<u8>)>) -> Result<Tabulated> {
-    let path = job_path.parent().unwrap_or(Path::new("")).join(name);
-    let bytes = fs::read(&path).map_err(|e| {
-        let allowed = format!("a table of docs/brdf-format.md, relative to the job file ({e})");
-        Error::input(job_path.display(), format!("material[{i}].file"), name, allowed)
-    })?;
+    let bytes = read_named(job_path, &format!("material[{i}].file"), name, "a table of docs/brdf-format.md")?;
     let table = Tabulated::parse(name, &bytes)?;
     files.push((Input::of(name, &bytes), bytes));
     Ok(table)
@@ -193,12 +192,8 @@ fn read_table(job_path: &Path, i: usize, name: &str, files: &mut Vec<(Input, Vec
 
 /// Reads the photometric file `name` of `job` at `job_path`, and adds it to `files`.
 fn read_web(job_path: &Path, job: &Job, name: &str, files: &mut Vec<(Input, Vec<u8>)>) -> Result<Photometry> {
-    let path = job_path.parent().unwrap_or(Path::new("")).join(name);
-    let bytes = fs::read(&path).map_err(|e| {
-        let first = job.luminaires.iter().position(|l| l.file == name).unwrap_or(0);
-        let allowed = format!("an IES or EULUMDAT file, relative to the job file ({e})");
-        Error::input(job_path.display(), format!("luminaire[{first}].file"), name, allowed)
-    })?;
+    let first = job.luminaires.iter().position(|l| l.file == name).unwrap_or(0);
+    let bytes = read_named(job_path, &format!("luminaire[{first}].file"), name, "an IES or EULUMDAT file")?;
     let web = Photometry::parse(name, &bytes)?;
     files.push((Input::of(name, &bytes), bytes));
     Ok(web)
@@ -207,10 +202,7 @@ fn read_web(job_path: &Path, job: &Job, name: &str, files: &mut Vec<(Input, Vec<
 /// Loads the scene file `name` of the job at `job_path`; every file read is added to `files`, the scene first.
 fn read_model(job_path: &Path, name: &str, files: &mut Vec<(Input, Vec<u8>)>) -> Result<Model> {
     let path = job_path.parent().unwrap_or(Path::new("")).join(name);
-    let bytes = fs::read(&path).map_err(|e| {
-        let allowed = format!("a .glb or .gltf file, relative to the job file ({e})");
-        Error::input(job_path.display(), "scene", name, allowed)
-    })?;
+    let bytes = read_named(job_path, "scene", name, "a .glb or .gltf file")?;
     files.push((Input::of(name, &bytes), bytes.clone()));
     let mut fetch = |uri: &str| {
         if let Some((_, known)) = files[1..].iter().find(|(input, _)| input.name == uri) {

@@ -75,7 +75,9 @@ pub fn some_by_flux(scene: &Scene, rng: &mut Generator) -> Vec<Asked> {
     let parallel = (0..beams.len()).filter(|&light| beams[light].is_none()).map(|light| (light, 1.0));
     let mut asked: Vec<Asked> = parallel.collect();
     let u = rng.uniform();
-    for k in 0..if among.all() > 0.0 { ROUGHLY } else { 0 } {
+    // Under a sky parallel light has no flux of its own here.
+    let others = if among.all() > 0.0 { ROUGHLY } else { 0 };
+    for k in 0..others {
         let (light, _) = among.choose((f64::from(k) + u) / f64::from(ROUGHLY));
         if beams[light].is_some() {
             asked.push((light, 1.0 / (f64::from(ROUGHLY) * among.probability(light))));
