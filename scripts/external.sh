@@ -1,13 +1,13 @@
 #!/bin/bash
 # Tests that need programs beside the Rust toolchain: the EXR maps in OpenEXR's and OpenImageIO's own tools, and the same bits on
-# an old processor in qemu; disks that are full or read-only (needs root); the same bits from a real Slurm and from hosts by ssh,
+# an old processor in qemu and with another C library; disks that are full or read-only (needs root); the same bits from a real Slurm and from hosts by ssh,
 # whose machines die at work.
 # Installs what is missing (Debian); a tool that cannot be had is a failure.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-packages=(openexr openimageio-tools qemu-user munge slurmctld slurmd slurm-client openssh-server openssh-client parallel rsync procps)
-tools=(exrheader exrinfo oiiotool iinfo qemu-x86_64 munged slurmctld slurmd sbatch sshd ssh parallel rsync pgrep)
+packages=(openexr openimageio-tools qemu-user patchelf munge slurmctld slurmd slurm-client openssh-server openssh-client parallel rsync procps)
+tools=(exrheader exrinfo oiiotool iinfo qemu-x86_64 patchelf munged slurmctld slurmd sbatch sshd ssh parallel rsync pgrep)
 PATH=$PATH:/usr/sbin
 
 missing=()
@@ -39,6 +39,7 @@ trap 'rm -rf "$folder"' EXIT
 target/release/lampyris run -q scripts/external/room.toml -o "$folder/room"
 scripts/external/check_exr.py "$folder/room"
 scripts/external/paths.sh target/release/lampyris "$folder"
+scripts/external/libc.sh target/release/lampyris "$folder"
 scripts/external/disk.sh target/release/lampyris "$folder"
 scripts/external/slurm.sh target/release/lampyris "$folder"
 scripts/external/ssh.sh target/release/lampyris "$folder"

@@ -41,6 +41,9 @@ pub enum Command {
         /// No progress.
         #[arg(short, long)]
         quiet: bool,
+        /// Whenever N whole shards have come together at the beginning, fold them into one file, as `compact` does.
+        #[arg(long, value_name = "N", value_parser = together())]
+        compact: Option<u64>,
     },
     /// Copy the job and its inputs into a folder, write the plan and print it with its sizes.
     #[command(after_help = "Example:\n  lampyris plan jobs/room.toml -o out/room")]
@@ -64,6 +67,9 @@ pub enum Command {
         /// Threads [default: the cores].
         #[arg(long, value_name = "N", value_parser = crew)]
         threads: Option<usize>,
+        /// Behind the shard, where N whole ones have come together at the beginning, fold them into one file, as `compact` does.
+        #[arg(long, value_name = "N", value_parser = together())]
+        compact: Option<u64>,
         /// Process whose end ends this worker, too.
         #[arg(long, value_name = "PID", hide = true)]
         parent: Option<i32>,
@@ -214,6 +220,9 @@ pub struct Submit {
     /// With slurm: submit nothing, print scripts and commands; a job file is planned all the same.
     #[arg(long)]
     pub dry_run: bool,
+    /// Whenever N whole shards have come together at the beginning, a worker folds them into one file; not on copies of DIR.
+    #[arg(long, value_name = "N", value_parser = together())]
+    pub compact: Option<u64>,
     /// With ssh: the file of hosts; a line has processes, [user@]host[:port], and a folder where DIR is not shared.
     #[arg(long, value_name = "FILE")]
     pub hosts: Option<PathBuf>,
@@ -226,6 +235,11 @@ pub enum Engine {
     Slurm,
     /// GNU parallel and ssh.
     Ssh,
+}
+
+/// A number of shards that are folded together.
+fn together() -> clap::builder::RangedU64ValueParser {
+    clap::value_parser!(u64).range(2..=100_000)
 }
 
 /// A share such as `1%`.

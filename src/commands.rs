@@ -30,6 +30,9 @@ use std::path::{Path, PathBuf};
 /// Checkpoints that `status` reads through, for the goal, at most \[bytes\].
 const CHEAP: u64 = 256 << 20;
 
+/// A task of Slurm waits so long for a plan that its node does not see yet \[s\]: NFS forgets what it remembers after 60 s at most.
+const LATE: u64 = 70;
+
 /// What a command says and how it ends.
 #[derive(Debug)]
 pub struct Outcome {
@@ -62,9 +65,16 @@ pub fn execute(command: Command) -> Result<Outcome> {
     // Asked for instructions that are not there, nothing is computed with others.
     simd::Path::chosen()?;
     match command {
-        Command::Run { job, output, workers, quiet } => run(&job, output, Options { workers, quiet }),
+        Command::Run { job, output, workers, quiet, compact } => run(&job, output, Options { workers, quiet }, compact),
         Command::Plan { job, output } => plan(&job, output),
-        Command::Work { dir, shard, threads, parent } => work(&dir, shard, threads, parent),
+        Command::Work { dir, shard, threads, compact, parent } => {
+            let folder = Folder::new(&dir);
+            let outcome = work(Order { folder: folder.clone(), shard, threads, parent })?;
+            if let (Exit::Done, Some(together)) = (outcome.exit, compact) {
+                compact_if_due(&folder, together);
+            }
+            Ok(outcome)
+        }
         Command::Status { dir, watch: true, .. } => watch::watch(&Folder::new(&dir)),
         Command::Status { dir, json, .. } => show_status(&dir, json),
         Command::Merge { dirs, output, wait } => {
@@ -90,10 +100,11 @@ pub fn execute(command: Command) -> Result<Outcome> {
     }
 }
 
-fn run(job: &Path, output: Option<PathBuf>, options: Options) -> Result<Outcome> {
+fn run(job: &Path, output: Option<PathBuf>, options: Options, together: Option<u64>) -> Result<Outcome> {
     let (folder, plan) = planned(job, output)?;
     let reached = |folder: &Folder| Ok(goal_reached(std::slice::from_ref(folder))?.is_some());
-    let before = match coordinator::run(&folder, &plan, options, &reached)? {
+    let shard_done = |folder: &Folder| together.iter().for_each(|&together| compact_if_due(folder, together));
+    let before = match coordinator::run(&folder, &plan, options, &reached, &shard_done)? {
         coordinator::Ended::WasDone if plan.job.stop.is_some() => "nothing was left to do\n".to_owned(),
         coordinator::Ended::WasDone => format!("all {} batches were done before\n", plan.job.run.batches),
         coordinator::Ended::Done => String::new(),
@@ -111,7 +122,7 @@ fn plan(job: &Path, output: Option<PathBuf>) -> Result<Outcome> {
     let sizes = plan.sizes();
     let text = format!(
         "{}\n# {} shards in {}\n# memory of a worker about {}, batch scores kept in all {}\n\
-         # disk of a checkpoint about {}, of all {}\n",
+         # disk of a checkpoint at most {}, of all {}; of noisy maps it is packed to some 0.55 of that\n",
         plan_text(&plan),
         plan.shard_count(),
         folder.root().display(),
@@ -143,14 +154,15 @@ fn establish(job: &Path, output: Option<PathBuf>) -> Result<(Folder, Plan)> {
     Ok((folder, plan))
 }
 
-fn work(dir: &Path, shard: u64, threads: Option<usize>, parent: Option<i32>) -> Result<Outcome> {
+fn work(order: Order) -> Result<Outcome> {
+    let shard = order.shard;
     // A worker of a coordinator answers to it, wherever that runs.
-    let task = if parent.is_none() { slurm::Task::of_environment() } else { None };
+    let task = if order.parent.is_none() { slurm::Task::of_environment() } else { None };
+    task.iter().for_each(|_| worker::await_plan(&order, LATE));
     let begun = |begun: &worker::Begun| {
         // The log of a job shows every attempt.
         task.iter().for_each(|task| crate::say(&format!("{begun} ({task})\n")));
     };
-    let order = Order { folder: Folder::new(dir), shard, threads, parent };
     let ended = worker::work(&order, &begun)?;
     if let Some(task) = task {
         answer(&task, shard, ended);
@@ -249,6 +261,18 @@ fn extend(dir: &Path, batches: u64) -> Result<Outcome> {
     let plan = Folder::new(dir).extend(batches)?;
     let text = format!("{} batches, {} shards in {}\n", plan.job.run.batches, plan.shard_count(), dir.display());
     Ok(Outcome { text, exit: Exit::Done })
+}
+
+/// Compacts `folder` where so many shards have come together. All shards stay as they are if that fails, and the next one that
+/// is done tries again: so a failure is only said.
+fn compact_if_due(folder: &Folder, together: u64) {
+    let compacted = folder.read_plan().and_then(|plan| match merge::compact::is_due(folder, &plan, together)? {
+        true => merge::compact::compact(folder, now()).map(|_| ()),
+        false => Ok(()),
+    });
+    if let Err(e) = compacted {
+        crate::warn(&format!("not compacted: {e}"));
+    }
 }
 
 fn compact(dir: &Path) -> Result<Outcome> {

@@ -24,3 +24,8 @@ fn main() -> ExitCode {
 fn say(text: &str) {
     let _ = std::io::stdout().write_all(text.as_bytes());
 }
+
+/// Prints on standard error what went wrong without ending anything.
+fn warn(text: &str) {
+    eprintln!("lampyris: {text}");
+}

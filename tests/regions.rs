@@ -212,16 +212,16 @@ fn mean_and_uniformity_of_a_simulated_grid_cover() {
     const REPLICATES: u64 = 500;
     let (truth, fixed) = row("[run]\nseed = 1000000\nhistories_per_batch = 4096\nbatches = 128");
     let truth = Family::new(&truth, &fixed);
-    let (mean, lowest) = (truth.mean().estimate(), truth.minimum(0.95).value);
+    let (mean, lowest) = (truth.mean().unwrap().estimate(), truth.minimum(0.95).unwrap().value);
     let uniformity = lowest / mean.mean;
     let (mut means, mut uos, mut minima, mut widths, mut error) = (0, 0, 0, [0.0; 2], 0.0);
     for seed in 0..REPLICATES {
         let (scores, fixed) = row(&format!("[run]\nseed = {seed}\nhistories_per_batch = 16\nbatches = 32"));
         let family = Family::new(&scores, &fixed);
         let quantile = lampyris::tally::statistics::student_quantile(0.95, 32);
-        let estimate: Estimate = family.mean().estimate();
+        let estimate: Estimate = family.mean().unwrap().estimate();
         let holds = |(low, high): (f64, f64), truth: f64| u64::from(low <= truth && truth <= high);
-        let (uo, min) = (family.uniformity(0.95), family.minimum(0.95));
+        let (uo, min) = (family.uniformity(0.95).unwrap(), family.minimum(0.95).unwrap());
         means += holds(estimate.interval(quantile), mean.mean);
         uos += holds((uo.low, uo.high), uniformity);
         minima += holds((min.low, min.high), lowest);

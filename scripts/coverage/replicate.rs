@@ -13,6 +13,9 @@ use lampyris::tally::statistics::{Estimate, student_quantile};
 use lampyris::tally::{Moments, Replicates, SetTally, Tally};
 use lampyris::validate::experiment::Experiment;
 
+/// Why reading batch scores does not fail here.
+const HELD: &str = "batch scores of one process are in memory";
+
 /// What is read from a replicate.
 #[derive(Clone, Debug)]
 pub enum Kind {
@@ -135,10 +138,10 @@ impl Replicate {
         let (intervals, standard_error) = match *kind {
             Kind::Total(set, bin) => of(self.estimate(set, bin).expect("a receiver")),
             Kind::Indirect(set) => of(Estimate::from_scores(self.indirect[set].iter().copied())),
-            Kind::Mean(set) => of(self.family(set).mean().estimate()),
+            Kind::Mean(set) => of(self.series(set).estimate()),
             Kind::Ratio(a, b) => of(ratio(&self.series(a), &self.series(b), confidence)),
-            Kind::Minimum(set) => bounded(self.family(set).minimum(confidence)),
-            Kind::Uniformity(set) => bounded(self.family(set).uniformity(confidence)),
+            Kind::Minimum(set) => bounded(self.family(set).minimum(confidence).expect(HELD)),
+            Kind::Uniformity(set) => bounded(self.family(set).uniformity(confidence).expect(HELD)),
             Kind::Together(set) => {
                 let bins = self.replicates(set).bins as usize;
                 let t = family_quantile(confidence, self.family(set).len(), batches);
@@ -160,7 +163,7 @@ impl Replicate {
     }
 
     fn series(&self, set: usize) -> Series {
-        self.family(set).mean()
+        self.family(set).mean().expect(HELD)
     }
 
     /// What the marks of a bin follow from.

@@ -1,7 +1,8 @@
 #!/bin/bash
 # A job array on a real Slurm of three nodes (scripts/slurm-testbed), of which one is killed and one cut off, while a shard is
 # preempted and another comes to its time limit: the bits of a run on one machine. Each worker is held at work until its
-# misfortune has hit it, so nothing depends on the speed of the machine.
+# misfortune has hit it, so nothing depends on the speed of the machine. Workers compact the folder meanwhile. Then a job with a
+# goal, submitted look by look.
 #
 #   slurm.sh PROGRAM FOLDER      writes below FOLDER; needs root, Slurm and oiiotool
 set -euo pipefail
@@ -32,7 +33,8 @@ trap after EXIT
 "$testbed" up 3 MaxArraySize=6
 eval "$("$testbed" env)"
 
-"$program" submit "$here/farm.toml" -o "$farm" --engine slurm --time 1 --partition batch --sbatch '--comment="a test"' |
+"$program" submit "$here/farm.toml" -o "$farm" --engine slurm --time 1 --partition batch --compact 4 \
+    --sbatch '--comment="a test"' |
     tee "$folder/said"
 grep -qx 'job 1: shards 0-5' "$folder/said"
 grep -qx 'job [0-9]*: shards 6-7' "$folder/said"
@@ -103,4 +105,20 @@ done
 grep -q 'attempt 2 on .* (Slurm job 1_.*, restart 1)' "$farm/slurm/1_$preempted.log"
 grep -h 'attempt' "$farm"/slurm/*.log | sort
 same_bits "$folder/one machine" "$farm" "the farm and one machine"
+[[ -e $farm/shards/compacted.ckpt && ! -e $farm/shards/shard-000000.ckpt ]] || { echo "nothing was compacted" >&2; exit 1; }
 say "the farm and one machine give the same bits"
+
+aim="$folder/a goal"
+"$program" run -q "$here/goal.toml" -o "$folder/a goal on one machine" >/dev/null
+looks=0
+while "$program" submit "$here/goal.toml" -o "$aim" --engine slurm --time 1 --partition batch >"$folder/said"; do
+    if grep -q 'nothing to submit: no shard is missing' "$folder/said"; then break; fi
+    grep -q 'up to the look at' "$folder/said"
+    job=$(sed -n 's/^job \([0-9]*\): merge, after these$/\1/p' "$folder/said")
+    wait_until 60 "the merge of a look" ended "$job"
+    looks=$((looks + 1))
+    ((looks <= 4)) || { echo "the goal is never reached" >&2; exit 1; }
+done
+((looks >= 2)) || { echo "the goal was reached at the first look: no second submission was needed" >&2; exit 1; }
+same_bits "$folder/a goal on one machine" "$aim" "a goal on the farm and on one machine"
+say "the goal was reached at look $looks, with the bits of one machine"

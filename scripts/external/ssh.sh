@@ -1,6 +1,7 @@
 #!/bin/bash
 # Two hosts without a scheduler: sshd twice on the loopback, one host with a copy of the folder, one that shares it and is
 # killed, workers and all, while it is at work: the bits of a run on one machine.
+# Then two shards in a shared folder that shows one of them some seconds late: nothing is computed twice.
 #
 #   ssh.sh PROGRAM FOLDER      writes below FOLDER; needs sshd, GNU parallel, rsync, oiiotool; root, to log in without a password
 set -euo pipefail
@@ -81,3 +82,27 @@ same_bits "$folder/one machine" "$farm" "two hosts and one machine"
 "$program" merge "$farm" "$copy" -o "$folder/merged" >/dev/null
 same_bits "$folder/one machine" "$folder/merged" "a copy merged in and one machine"
 say "two hosts and one machine give the same bits"
+
+# As a network file system may: the file of shard 0 is away when the last worker ends, and comes back later.
+late="$folder/shown late"
+sed "s/^batches = 128/batches = 32/; s|^scene = \"|&$here/|" "$here/farm.toml" >"$folder/two.toml"
+"$program" run -q "$folder/two.toml" -o "$folder/two on one machine" >/dev/null
+echo '2 :' >"$folder/this machine"
+"$program" submit "$folder/two.toml" -o "$late" --engine ssh --hosts "$folder/this machine" >"$folder/said" 2>&1 &
+submitted=$!
+batches_of() {
+    "$program" status --json "$late" | python3 -c 'import json, sys
+print(sum(s["batches"] for s in json.load(sys.stdin)["shards"] if s["shard"] == int(sys.argv[1])))' "$1"
+}
+is_whole() { (($(batches_of "$1") == 16)); }
+wait_until 60 "shard 1 is at work" held_at_work "$late" 1
+wait_until 60 "shard 0 is done" is_whole 0
+mv "$late/shards/shard-000000.ckpt" "$folder/not shown yet"
+kill -CONT "$(worker_of "$late" 1)"
+wait_until 60 "shard 1 is done" is_whole 1
+sleep 3
+mv "$folder/not shown yet" "$late/shards/shard-000000.ckpt"
+wait "$submitted" || { cat "$folder/said" >&2; exit 1; }
+same_bits "$folder/two on one machine" "$late" "a shard that is shown late and one machine"
+(($(wc -l <"$late/attempts/shard-000000.jsonl") == 1)) || { echo "shard 0 was computed twice" >&2; exit 1; }
+say "a shard that was shown late was waited for"

@@ -1,6 +1,6 @@
 //! `lampyris submit`: a job file or a planned folder to an engine.
 
-use super::{Exit, Outcome, establish, merge_and_report, missing};
+use super::{Exit, Outcome, compact_if_due, establish, merge_and_report, missing};
 use crate::cli::{Engine, Submit};
 use lampyris::error::{Error, Result};
 use lampyris::farm::engines::slurm::{self, TimeLimit};
@@ -18,7 +18,7 @@ pub(super) fn submit(request: Submit) -> Result<Outcome> {
     let (folder, plan) = planned(&request)?;
     match (request.engine, &request.hosts) {
         (Engine::Slurm, _) => by_slurm(request, &folder, &plan),
-        (Engine::Ssh, Some(hosts)) => by_ssh(hosts, &folder, &plan),
+        (Engine::Ssh, Some(hosts)) => by_ssh(hosts, request.compact, &folder, &plan),
         (Engine::Ssh, None) => Err(missing_hosts()),
     }
 }
@@ -68,16 +68,18 @@ fn planned(request: &Submit) -> Result<(Folder, Plan)> {
 }
 
 fn by_slurm(request: Submit, folder: &Folder, plan: &Plan) -> Result<Outcome> {
-    let Submit { array_limit, time, partition, sbatch, dry_run, .. } = request;
-    let request = slurm::Request { array_limit, time: time.unwrap_or(ONE_HOUR), partition, sbatch, dry_run };
+    let Submit { array_limit, time, partition, sbatch, dry_run, compact, .. } = request;
+    let time = time.unwrap_or(ONE_HOUR);
+    let request = slurm::Request { array_limit, time, partition, sbatch, dry_run, compact };
     let text = slurm::submit(folder, plan, &missing(folder)?, &request)?;
     Ok(Outcome { text, exit: Exit::Done })
 }
 
 /// Computes in the foreground, then merges.
-fn by_ssh(hosts: &Path, folder: &Folder, plan: &Plan) -> Result<Outcome> {
+fn by_ssh(hosts: &Path, compact: Option<u64>, folder: &Folder, plan: &Plan) -> Result<Outcome> {
     let hosts = ssh::hosts::read(hosts)?;
-    match ssh::run(folder, plan, &hosts, &|| missing(folder), &crate::say)? {
+    let visited = || compact.iter().for_each(|&together| compact_if_due(folder, together));
+    match ssh::run(folder, plan, &hosts, &|| missing(folder), &visited, &crate::say)? {
         ssh::Ended::Done => merge_and_report(&[folder.root().to_owned()], None),
         ssh::Ended::Stopped => {
             let text = format!("stopped; the same command goes on in {}\n", folder.root().display());

@@ -97,14 +97,15 @@ pub fn now() -> u64 {
 pub fn status(folder: &Folder) -> Result<Status> {
     let plan = folder.read_plan()?;
     let (mut shards, mut refused) = (BTreeMap::new(), Vec::new());
+    for (k, path) in folder.checkpoints()? {
+        if let Some(header) = kept(read_header(&path, &plan, k), &mut refused)? {
+            shards.insert(k, ShardStatus::new(&plan, k, &header));
+        }
+    }
+    // After the shards: what is compacted meanwhile is seen twice, and not missed.
     let folded = kept(read_compaction(folder, &plan), &mut refused)?;
     for (k, header) in (0..).zip(folded.iter().flat_map(|folded| folded.parts(&plan))) {
         shards.insert(k, ShardStatus::new(&plan, k, &header));
-    }
-    for (k, path) in folder.checkpoints()? {
-        if let Some(header) = kept(read_header(&path, &plan, k), &mut refused)? {
-            shards.entry(k).or_insert_with(|| ShardStatus::new(&plan, k, &header));
-        }
     }
     for k in attempts::begun(folder)?.into_iter().filter(|&k| k < plan.shard_count()) {
         let shard = shards.entry(k).or_insert_with(|| ShardStatus::not_begun(&plan, k));

@@ -76,6 +76,16 @@ impl std::fmt::Display for Begun {
     }
 }
 
+/// Waits for the plan of `order`, one with its shard, `seconds` at most: what another machine has written or extended a network file
+/// system may show late. Says nothing of what it sees: [`work`] does.
+pub fn await_plan(order: &Order, seconds: u64) {
+    let (begun, patience) = (Instant::now(), Duration::from_secs(seconds));
+    let is_there = || order.folder.read_plan().is_ok_and(|plan| order.shard < plan.shard_count());
+    while begun.elapsed() < patience && !is_there() {
+        std::thread::sleep(Duration::from_secs(1).min(patience));
+    }
+}
+
 /// Computes the rest of one shard; `begun` is told before the first batch.
 ///
 /// # Errors

@@ -94,16 +94,16 @@ pub(super) fn of_set(
     let family = Family::new(scores, fixed_direct);
     Ok(match values.shape.kind {
         ReceiverKind::Region => {
-            let mean = Quantity::of_mean(&family.mean(), confidence, REGION).marked(health);
+            let mean = Quantity::of_mean(&family.mean()?, confidence, REGION).marked(health);
             OfSet { interval: Some(mean), ..OfSet::default() }
         }
         ReceiverKind::Grid => {
-            let of_grid = OfGrid::new(&family, merged.batches, confidence).marked(health, health_of_least(values)?);
+            let of_grid = OfGrid::new(&family, merged.batches, confidence)?.marked(health, health_of_least(values)?);
             let daylight_factor = outdoor.map(|e| DaylightFactor::new(e, &of_grid.mean, Some(&of_grid.min)));
             OfSet { derived: Some(of_grid), daylight_factor, ..OfSet::default() }
         }
         ReceiverKind::Point => {
-            let value = Quantity::of_mean(&family.mean(), confidence, MEAN).marked(health);
+            let value = Quantity::of_mean(&family.mean()?, confidence, MEAN).marked(health);
             OfSet { daylight_factor: outdoor.map(|e| DaylightFactor::new(e, &value, None)), ..OfSet::default() }
         }
         ReceiverKind::Camera | ReceiverKind::Gonio => OfSet::default(),
@@ -120,7 +120,7 @@ pub(super) fn health_of_mean(plan: &Plan, merged: &Merged, set: usize, values: &
         return Ok(values.single()?.health.unwrap_or_default());
     }
     let family = Family::new(scores, fixed_direct);
-    let mean = family.mean();
+    let mean = family.mean()?;
     let common = Common {
         histories: (merged.batches * plan.job.run.histories_per_batch) as f64,
         narrowest_lobe: plan.scene.narrowest_lobe,
@@ -131,7 +131,7 @@ pub(super) fn health_of_mean(plan: &Plan, merged: &Merged, set: usize, values: &
         // What a single history gives a mean over bins is not known.
         peak: f64::NAN,
         vov: variance_of_variance(mean.scores.iter().copied()),
-        caustic: family.caustic(),
+        caustic: family.caustic()?,
     };
     Ok(health(&Signs::of(&common, &counted, mean.fixed, None)))
 }
@@ -151,25 +151,28 @@ fn health_of_least(values: &SetValues) -> io::Result<Health> {
 }
 
 /// The ratios of the job, in its order; `healths` are those of the means of its sets.
-pub(super) fn ratios(plan: &Plan, merged: &Merged, healths: &[Health]) -> Vec<OfRatio> {
+///
+/// # Errors
+/// Those of reading batch scores that are kept in a file.
+pub(super) fn ratios(plan: &Plan, merged: &Merged, healths: &[Health]) -> io::Result<Vec<OfRatio>> {
     let shapes = plan.job.sets();
-    let side = |name: &str| {
+    let side = |name: &str| -> io::Result<(Series, Health)> {
         let place = shapes.iter().position(|s| s.name == name).expect("a ratio of a checked job is one of its sets");
         match &merged.sets[place] {
             SetResult::Replicates { scores, fixed_direct } => {
-                (Family::new(scores, fixed_direct).mean(), healths[place])
+                Ok((Family::new(scores, fixed_direct).mean()?, healths[place]))
             }
             SetResult::Moments { .. } => unreachable!("a ratio of a checked job is one of sets that keep batches"),
         }
     };
     let of_ratio = |r: &crate::job::Ratio| {
-        let ((above, its), (below, other)) = (side(&r.numerator), side(&r.denominator));
-        OfRatio {
+        let ((above, its), (below, other)) = (side(&r.numerator)?, side(&r.denominator)?);
+        Ok(OfRatio {
             name: r.name.clone(),
             numerator: r.numerator.clone(),
             denominator: r.denominator.clone(),
             quantity: Quantity::of_ratio(&above, &below, plan.job.run.confidence).marked(its.and(other)),
-        }
+        })
     };
     plan.job.ratios.iter().map(of_ratio).collect()
 }
@@ -224,17 +227,17 @@ impl Quantity {
 }
 
 impl OfGrid {
-    fn new(family: &Family, batches: u64, confidence: f64) -> Self {
-        let mean = family.mean();
+    fn new(family: &Family, batches: u64, confidence: f64) -> io::Result<Self> {
+        let mean = family.mean()?;
         let note = why_none(&mean);
         let of_ratio = first([note, why_no_ratio(&mean, confidence)]);
-        OfGrid {
+        Ok(OfGrid {
             points: family.len(),
             family_quantile: family_quantile(confidence, family.len(), batches),
             mean: Quantity::of_mean(&mean, confidence, MEAN),
-            min: Quantity::of_least(family.minimum(confidence), MINIMUM, note),
-            uniformity: Quantity::of_least(family.uniformity(confidence), UNIFORMITY, of_ratio),
-        }
+            min: Quantity::of_least(family.minimum(confidence)?, MINIMUM, note),
+            uniformity: Quantity::of_least(family.uniformity(confidence)?, UNIFORMITY, of_ratio),
+        })
     }
 
     /// The same with the marks of the mean and of the least of the points.

@@ -75,6 +75,7 @@ pub fn write(plan: &Plan, merged: &Merged, dir: &Path) -> Result<String> {
     let mut collector = Collector::new(plan, merged);
     let (mut points, mut regions) = (Vec::new(), Vec::new());
     for values in SetValues::all(plan, merged) {
+        let values = values.map_err(Error::io(dir))?;
         collector.add(&values).map_err(Error::io(dir))?;
         match values.shape.kind {
             ReceiverKind::Point => points.push(values),
@@ -88,7 +89,7 @@ pub fn write(plan: &Plan, merged: &Merged, dir: &Path) -> Result<String> {
     if !regions.is_empty() {
         replace(&dir.join("regions.csv"), |to| regions::write(plan, merged, &regions, to))?;
     }
-    let summary = collector.finish();
+    let summary = collector.finish().map_err(Error::io(dir))?;
     replace(&dir.join("summary.json"), |to| summary::write_json(&summary, to))?;
     Ok(text::table_of(&summary))
 }

@@ -8,9 +8,9 @@ use super::stopping::StoppedBy;
 use super::values::{Bin, SetValues, Status, kind_name, unit};
 use crate::farm::merge::Merged;
 use crate::farm::plan::{Input, Plan};
-use crate::tally::FLUX_BINS;
 use crate::tally::health::{FEW_BATCHES, Health};
 use crate::tally::statistics::{Estimate, figure_of_merit, select, student_quantile};
+use crate::tally::{EveryBatch, FLUX_BINS};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::io::{Result, Write};
@@ -159,14 +159,17 @@ impl<'a> Collector<'a> {
     }
 
     /// The summary of all.
-    pub fn finish(mut self) -> Summary {
-        let flux = Flux::new(self.merged, self.plan.job.run.confidence);
+    ///
+    /// # Errors
+    /// Those of reading batch scores that are kept in a file.
+    pub fn finish(mut self) -> Result<Summary> {
+        let flux = Flux::new(self.merged, self.plan.job.run.confidence)?;
         for term in flux.terms() {
             self.hash(&[term.mean, term.standard_error, term.ci_lower, term.ci_upper]);
         }
         let (plan, merged, run) = (self.plan, self.merged, &self.plan.job.run);
         let histories = merged.batches * run.histories_per_batch;
-        Summary {
+        Ok(Summary {
             program: plan.program.clone(),
             numerics: plan.numerics,
             name: plan.name.clone(),
@@ -185,7 +188,7 @@ impl<'a> Collector<'a> {
             estimate: estimate_label(plan),
             warnings: warnings(plan, merged, &flux, lines(&self.sets, &self.monitored)),
             sets: self.sets,
-            ratios: ratios(plan, merged, &self.healths),
+            ratios: ratios(plan, merged, &self.healths)?,
             monitored: self.monitored,
             flux_lm: flux,
             timings: Timings {
@@ -194,7 +197,7 @@ impl<'a> Collector<'a> {
             },
             instructions: merged.instructions.clone(),
             results_digest: self.hasher.finalize().to_hex().to_string(),
-        }
+        })
     }
 
     fn hash(&mut self, numbers: &[f64]) {
@@ -308,15 +311,26 @@ impl Term {
 }
 
 impl Flux {
-    fn new(merged: &Merged, confidence: f64) -> Self {
+    fn new(merged: &Merged, confidence: f64) -> Result<Self> {
         let quantile = student_quantile(confidence, merged.batches);
+        let mut estimates = Vec::with_capacity(FLUX_BINS.len());
+        let mut differences = vec![0.0; merged.batches as usize];
+        merged.flux.each(&mut |first, group| {
+            for bin in 0..group.bins as usize {
+                estimates.push(group.estimate(bin));
+                let both = differences.iter_mut().zip(group.scores(bin));
+                match FLUX_BINS[first + bin] {
+                    "emitted" => both.for_each(|(difference, score)| *difference += score),
+                    "absorbed" | "escaped" | "lost" => both.for_each(|(difference, score)| *difference -= score),
+                    _ => {}
+                }
+            }
+        })?;
         let [emitted, absorbed, escaped, lost, met_delta] = ["emitted", "absorbed", "escaped", "lost", "met_delta"]
-            .map(|name| Term::new(merged.flux.estimate(place(name)), quantile));
-        let bins = ["emitted", "absorbed", "escaped", "lost"].map(place);
-        let balance = |batch: &[f64]| batch[bins[0]] - batch[bins[1]] - batch[bins[2]] - batch[bins[3]];
-        let difference = Estimate::from_scores(merged.flux.value.chunks_exact(FLUX_BINS.len()).map(balance));
+            .map(|name| Term::new(estimates[place(name)], quantile));
+        let difference = Estimate::from_scores(differences.iter().copied());
         let met_delta_share = met_delta.mean / emitted.mean;
-        Flux {
+        Ok(Flux {
             difference: Term::new(difference, quantile),
             met_delta_meaning: met_delta_meaning(emitted.mean, met_delta_share),
             met_delta_share,
@@ -325,7 +339,7 @@ impl Flux {
             escaped,
             lost,
             met_delta,
-        }
+        })
     }
 
     fn terms(&self) -> [&Term; 6] {

@@ -8,9 +8,9 @@ use crate::farm::checkpoint::BLOCK;
 use crate::farm::merge::{Blocks, Merged, SetResult};
 use crate::farm::plan::Plan;
 use crate::job::{ReceiverKind, SetShape};
-use crate::tally::Monitor;
 use crate::tally::health::{Common, Counted, Examined, Health, Signs, health};
 use crate::tally::statistics::student_quantile;
+use crate::tally::{EveryBatch, Monitor};
 use std::io;
 
 /// What is known of a bin.
@@ -102,7 +102,16 @@ enum Source<'a> {
 
 impl<'a> SetValues<'a> {
     /// The numbers of the receiver set `shape` of which `set` is the result and `monitors` are its monitored bins.
-    pub fn new(plan: &Plan, merged: &Merged, shape: &SetShape, set: &'a SetResult, monitors: &[Monitor]) -> Self {
+    ///
+    /// # Errors
+    /// Those of reading batch scores that are kept in a file.
+    pub fn new(
+        plan: &Plan,
+        merged: &Merged,
+        shape: &SetShape,
+        set: &'a SetResult,
+        monitors: &[Monitor],
+    ) -> io::Result<Self> {
         let batches = merged.batches;
         let run = &plan.job.run;
         let (SetResult::Moments { fixed_direct, .. } | SetResult::Replicates { fixed_direct, .. }) = set;
@@ -121,12 +130,19 @@ impl<'a> SetValues<'a> {
                 Source::Streamed { rule, batches, blocks, fixed_direct }
             }
             SetResult::Replicates { scores, .. } => {
-                assert!(scores.has_shape(shape.bins(), batches), "the result of another set");
-                let bin = |i| rule.bin((Counted::of_replicates(scores, i), None), fixed_direct, i, find(&monitored, i));
-                Source::Held((0..shape.bins()).map(bin).collect())
+                assert_eq!((scores.bins(), scores.batches()), (shape.bins(), batches), "the result of another set");
+                let mut bins = Vec::with_capacity(shape.bins());
+                scores.each(&mut |first, group| {
+                    let bin = |i| {
+                        let counted = Counted::of_replicates(group, i);
+                        rule.bin((counted, None), fixed_direct, first + i, find(&monitored, first + i))
+                    };
+                    bins.extend((0..group.bins as usize).map(bin));
+                })?;
+                Source::Held(bins)
             }
         };
-        SetValues { shape: shape.clone(), monitored, source }
+        Ok(SetValues { shape: shape.clone(), monitored, source })
     }
 
     /// Gives every bin with its number to `take`, row by row.
@@ -178,7 +194,7 @@ impl<'a> SetValues<'a> {
     }
 
     /// All receiver sets of `plan`, one at a time.
-    pub fn all(plan: &'a Plan, merged: &'a Merged) -> impl Iterator<Item = SetValues<'a>> + 'a {
+    pub fn all(plan: &'a Plan, merged: &'a Merged) -> impl Iterator<Item = io::Result<SetValues<'a>>> + 'a {
         let shapes = plan.job.sets();
         let lengths = [merged.sets.len(), merged.monitors.len()];
         assert_eq!(lengths, [shapes.len(); 2], "a result for each receiver set");

@@ -37,7 +37,8 @@
 
 use super::statistics::{Estimate, student_quantile};
 use super::student::tail_quantile;
-use super::{Replicates, informed};
+use super::{EveryBatch, Replicates, informed};
+use std::io;
 
 /// One number a batch, and a constant that belongs to each of them.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,9 +63,8 @@ pub struct Bounded {
 }
 
 /// The bins of a set about which something is said at once: those that have a receiver.
-#[derive(Clone, Debug)]
 pub struct Family<'a> {
-    scores: &'a Replicates,
+    scores: &'a dyn EveryBatch,
     /// Number and fixed part of each.
     members: Vec<(usize, f64)>,
 }
@@ -143,9 +143,9 @@ impl LeaveOneOut {
 impl<'a> Family<'a> {
     /// The bins of `scores` of which `fixed` is the part that is the same in every batch: NaN for a bin without
     /// receiver, empty for zero everywhere.
-    pub fn new(scores: &'a Replicates, fixed: &[f64]) -> Self {
+    pub fn new(scores: &'a dyn EveryBatch, fixed: &[f64]) -> Self {
         let part = |bin: usize| (bin, fixed.get(bin).copied().unwrap_or(0.0));
-        let members = (0..scores.bins as usize).map(part).filter(|(_, fixed)| !fixed.is_nan()).collect();
+        let members = (0..scores.bins()).map(part).filter(|(_, fixed)| !fixed.is_nan()).collect();
         Family { scores, members }
     }
 
@@ -160,55 +160,84 @@ impl<'a> Family<'a> {
     }
 
     /// The mean over the bins, batch by batch; something is known of it where a history reached any of them.
-    pub fn mean(&self) -> Series {
+    ///
+    /// # Errors
+    /// Those of reading batch scores that are kept in a file.
+    pub fn mean(&self) -> io::Result<Series> {
         let count = self.members.len() as f64;
-        let of_batch = |batch: &[f64]| self.members.iter().map(|&(bin, _)| batch[bin]).sum::<f64>() / count;
-        let scores = self.scores.value.chunks_exact(self.scores.bins.max(1) as usize).map(of_batch).collect();
-        let bins = || self.members.iter().map(|&(bin, _)| bin);
-        let existed = bins().map(|bin| self.scores.existed[bin]).max().unwrap_or(0);
-        let peak = bins().map(|bin| self.scores.peak[bin]).fold(0.0, f64::max);
+        // -0, because adding it changes no bit.
+        let mut sums = vec![-0.0; self.scores.batches() as usize];
+        let (mut existed, mut peak) = (0, 0.0f64);
+        self.each(&mut |group, bin, _| {
+            sums.iter_mut().zip(group.scores(bin)).for_each(|(sum, score)| *sum += score);
+            existed = existed.max(group.existed[bin]);
+            peak = peak.max(group.peak[bin]);
+        })?;
         let fixed = self.members.iter().map(|(_, fixed)| fixed).sum::<f64>() / count;
-        Series { scores, fixed, informed: informed(existed, peak) }
+        sums.iter_mut().for_each(|sum| *sum /= count);
+        Ok(Series { scores: sums, fixed, informed: informed(existed, peak) })
     }
 
     /// The mean over the bins of the largest light of a batch that no bound holds, see [`super::Scores::caustic`].
-    pub fn caustic(&self) -> f64 {
-        let sum: f64 = self.members.iter().map(|&(bin, _)| self.scores.caustic[bin]).sum();
-        sum / self.members.len() as f64
+    ///
+    /// # Errors
+    /// As [`Family::mean`].
+    pub fn caustic(&self) -> io::Result<f64> {
+        let mut sum = -0.0;
+        self.each(&mut |group, bin, _| sum += group.caustic[bin])?;
+        Ok(sum / self.members.len() as f64)
     }
 
     /// The least of the means of the bins, by equation (11.6).
-    pub fn minimum(&self, confidence: f64) -> Bounded {
-        let estimate = |&(bin, fixed): &(usize, f64)| self.scores.estimate(bin).shifted(fixed);
-        self.bounded(confidence, self.members.iter().map(estimate))
+    ///
+    /// # Errors
+    /// As [`Family::mean`].
+    pub fn minimum(&self, confidence: f64) -> io::Result<Bounded> {
+        self.bounded(confidence, |group, bin, fixed| group.estimate(bin).shifted(fixed))
     }
 
     /// The least of the means of the bins over the mean of all, by equation (11.6). No interval where that of the mean
     /// contains zero.
-    pub fn uniformity(&self, confidence: f64) -> Bounded {
-        let mean = self.mean();
+    ///
+    /// # Errors
+    /// As [`Family::mean`].
+    pub fn uniformity(&self, confidence: f64) -> io::Result<Bounded> {
+        let mean = self.mean()?;
         let denominator = LeaveOneOut::new(&mean);
-        let share = |&(bin, fixed): &(usize, f64)| {
-            let informed = self.scores.informed(bin);
-            let series = Series { scores: self.scores.scores(bin).collect(), fixed, informed };
+        let share = |group: &Replicates, bin: usize, fixed: f64| {
+            let informed = group.informed(bin);
+            let series = Series { scores: group.scores(bin).collect(), fixed, informed };
             LeaveOneOut::new(&series).over(&denominator).or_no_error(informed)
         };
-        let uniformity = self.bounded(confidence, self.members.iter().map(share));
+        let uniformity = self.bounded(confidence, share)?;
         if mean.is_clear_of_zero(confidence) {
-            uniformity
+            Ok(uniformity)
         } else {
-            Bounded { low: f64::NAN, high: f64::NAN, ..uniformity }
+            Ok(Bounded { low: f64::NAN, high: f64::NAN, ..uniformity })
         }
     }
 
-    fn bounded(&self, confidence: f64, members: impl Iterator<Item = Estimate>) -> Bounded {
+    /// Gives each member to `take`: the scores of some bins, its number among them, its fixed part.
+    fn each(&self, take: &mut dyn FnMut(&Replicates, usize, f64)) -> io::Result<()> {
+        let mut members = self.members.iter().peekable();
+        self.scores.each(&mut |first, group| {
+            let end = first + group.bins as usize;
+            while let Some((bin, fixed)) = members.next_if(|(bin, _)| *bin < end) {
+                take(group, bin - first, *fixed);
+            }
+        })
+    }
+
+    fn bounded(&self, confidence: f64, estimate: impl Fn(&Replicates, usize, f64) -> Estimate) -> io::Result<Bounded> {
         let quantile = family_quantile(confidence, self.members.len(), self.scores.batches());
         let mut value = f64::NAN;
-        let intervals = members.map(|estimate| {
+        let mut intervals = Vec::with_capacity(self.members.len());
+        self.each(&mut |group, bin, fixed| {
+            let estimate = estimate(group, bin, fixed);
             value = value.min(estimate.mean);
-            estimate.interval(quantile)
-        });
-        let (low, high) = least(intervals);
-        Bounded { value, low, high }
+            intervals.push(estimate.interval(quantile));
+        })?;
+        let (low, high) = least(intervals.into_iter());
+        Ok(Bounded { value, low, high })
     }
 }

@@ -22,7 +22,7 @@ mod student;
 
 pub use moments::{MomentBlock, Moments};
 pub use monitor::{HistoryMoments, LARGEST, Monitor, Watched};
-pub use replicates::Replicates;
+pub use replicates::{EveryBatch, Replicates};
 
 use crate::job::{Kept, SetShape};
 

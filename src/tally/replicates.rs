@@ -3,6 +3,22 @@
 use super::statistics::Estimate;
 use super::{Scores, informed};
 use serde::{Deserialize, Serialize};
+use std::io;
+
+/// The batch scores of a set some bins at a time, so that they need not fit into memory together.
+pub trait EveryBatch {
+    /// Number of bins.
+    fn bins(&self) -> usize;
+
+    /// Number of batches.
+    fn batches(&self) -> u64;
+
+    /// Gives all bins in order to `take`, some together: the number of the first of them, and their scores.
+    ///
+    /// # Errors
+    /// Those of reading what is kept in a file.
+    fn each(&self, take: &mut dyn FnMut(usize, &Replicates)) -> io::Result<()>;
+}
 
 /// Batch scores row by row: entry `batch * bins + bin`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -100,5 +116,20 @@ impl Replicates {
     /// Whether anything is known about the error of one bin, see [`informed`].
     pub fn informed(&self, bin: usize) -> bool {
         informed(self.existed[bin], self.peak[bin])
+    }
+}
+
+impl EveryBatch for Replicates {
+    fn bins(&self) -> usize {
+        self.bins as usize
+    }
+
+    fn batches(&self) -> u64 {
+        Replicates::batches(self)
+    }
+
+    fn each(&self, take: &mut dyn FnMut(usize, &Replicates)) -> io::Result<()> {
+        take(0, self);
+        Ok(())
     }
 }

@@ -60,3 +60,26 @@ fn compacting_while_workers_run_changes_nothing() {
     assert_eq!(left.count(), 2, "the compaction and the short last shard");
     place.finish(&dir);
 }
+
+#[test]
+fn workers_and_runs_compact_whenever_enough_has_come_together() {
+    let place = Place::new();
+    let dir = place.planned("dir");
+    expect(0, work(&dir, 0).args(["--compact", "2"]));
+    assert!(dir.join(checkpoint(0)).exists(), "one is too few");
+    expect(0, &mut work(&dir, 2));
+    expect(0, work(&dir, 1).args(["--compact", "2"]));
+    assert!((0..3).all(|shard| !dir.join(checkpoint(shard)).exists()), "all that is whole from the first on is taken");
+    expect(0, run_quietly(&place.path("job.toml"), &dir, 2).args(["--compact", "2"]));
+    assert!((3..5).all(|shard| !dir.join(checkpoint(shard)).exists()));
+    place.finish(&dir);
+    // What cannot be compacted harms no shard.
+    let dir = place.planned("broken");
+    expect(0, &mut work(&dir, 0));
+    std::fs::write(dir.join(checkpoint(4)), "no checkpoint").unwrap();
+    let said = expect(0, work(&dir, 1).args(["--compact", "2"]));
+    assert!(
+        said.contains("not compacted: ") && said.contains("shard-000004.ckpt") && said.contains("shard 1: done"),
+        "{said}"
+    );
+}

@@ -3,8 +3,9 @@
 
 use crate::bits::{Bits, summary};
 use crate::place::{BATCHES, Place, SHARDS, batches, batches_of, checkpoint, computed, plan_in, straight};
-use crate::process::{alive, expect, lampyris, pid, run_quietly, send, start, wait_for, work};
+use crate::process::{alive, expect, lampyris, pid, run_quietly, send, start, stat, wait_for, work};
 use lampyris::farm::attempts;
+use lampyris::farm::durable::lock_path;
 use lampyris::farm::folder::Folder;
 use nix::sys::signal::Signal;
 use std::fs;
@@ -23,9 +24,11 @@ fn one_shard(place: &Place, name: &str) -> PathBuf {
     place.plan(&path, name)
 }
 
-/// Starts a worker on shard 0, as Slurm would or not, and waits until it is about to compute its first batch.
+/// Starts a worker on shard 0, as Slurm would or not, and waits until it has written a checkpoint and goes on: a signal finds
+/// it computing a batch.
 fn begin(dir: &Path, by_slurm: bool) -> Child {
     let before = attempts::read(&Folder::new(dir), 0).unwrap().len();
+    let had = batches(dir, 0);
     let mut command = work(dir, 0);
     if by_slurm {
         // Without programs: scontrol can be asked for nothing.
@@ -33,6 +36,13 @@ fn begin(dir: &Path, by_slurm: bool) -> Child {
     }
     let worker = start(&mut command);
     wait_for("an attempt", || (attempts::read(&Folder::new(dir), 0).unwrap().len() > before).then_some(()));
+    send(pid(&worker), Signal::SIGUSR1);
+    more_than(dir, had);
+    // Whoever replaces a checkpoint holds its lock to the end.
+    fs::File::open(lock_path(&dir.join(checkpoint(0)))).unwrap().lock().unwrap();
+    let ticks = || stat(pid(&worker)).unwrap().ticks;
+    let saved = ticks();
+    wait_for("the next batch", || (ticks() > saved + 1).then_some(()));
     worker
 }
 
@@ -46,8 +56,9 @@ fn sigusr1_writes_a_checkpoint_and_the_worker_goes_on() {
     let place = Place::new();
     let dir = one_shard(&place, "dir");
     let mut worker = begin(&dir, false);
+    let before = batches(&dir, 0);
     send(pid(&worker), Signal::SIGUSR1);
-    let first = more_than(&dir, 0);
+    let first = more_than(&dir, before);
     send(pid(&worker), Signal::SIGUSR1);
     let second = more_than(&dir, first);
     assert!(second < 200 && alive(pid(&worker)), "{first}, {second}");
@@ -62,15 +73,15 @@ fn sigusr2_ends_a_worker_after_a_checkpoint() {
     let dir = one_shard(&place, "dir");
     // By itself; and where Slurm cannot be asked to run it again, with the same code: incomplete, but nothing is lost.
     for by_slurm in [false, true] {
-        let had = batches(&dir, 0);
         let mut worker = begin(&dir, by_slurm);
+        let had = batches(&dir, 0);
         send(pid(&worker), Signal::SIGUSR2);
         assert_eq!(worker.wait().unwrap().code(), Some(75));
         assert!((had + 1..200).contains(&batches(&dir, 0)));
     }
     let attempts = attempts::read(&Folder::new(&dir), 0).unwrap();
     assert_eq!((attempts[0].batches, attempts.len()), (0, 2));
-    assert!(attempts[1].batches > 0);
+    assert!(attempts[1].batches > 1);
 }
 
 #[test]
@@ -78,8 +89,9 @@ fn a_task_of_slurm_writes_a_checkpoint_at_sigterm_and_waits_to_be_killed() {
     let place = Place::new();
     let dir = one_shard(&place, "dir");
     let mut worker = begin(&dir, true);
+    let before = batches(&dir, 0);
     send(pid(&worker), Signal::SIGTERM);
-    let written = more_than(&dir, 0);
+    let written = more_than(&dir, before);
     // Signals wake it, and it goes on waiting: neither an exit code nor another batch.
     for signal in [Signal::SIGTERM, Signal::SIGUSR1, Signal::SIGUSR2, Signal::SIGTERM] {
         send(pid(&worker), signal);
@@ -123,7 +135,7 @@ fn a_dry_run_shows_scripts_and_commands_for_what_is_missing_and_writes_nothing()
     assert!(said.contains("shards 0-1,3-5 are missing; ") && said.contains(&again), "{said}");
     computed().restore(&dir);
     let said = expect(0, submit(&dir).arg("--dry-run"));
-    assert!(said.starts_with("nothing to submit: every shard is complete"), "{said}");
+    assert!(said.starts_with("nothing to submit: no shard is missing"), "{said}");
 }
 
 #[test]
@@ -144,7 +156,7 @@ fn of_a_compacted_folder_only_what_is_missing_behind_it_is_submitted_and_compute
     assert_eq!(seen["shards"][0]["host"], seen["hosts"][0]["host"], "{seen}");
     (3..6).for_each(|shard| drop(expect(0, &mut work(&dir, shard))));
     let said = expect(0, submit(&dir).arg("--dry-run"));
-    assert!(said.starts_with("nothing to submit: every shard is complete"), "{said}");
+    assert!(said.starts_with("nothing to submit: no shard is missing"), "{said}");
     expect(0, lampyris(&["merge"]).arg(&dir));
     Bits::of(&dir).assert_same(&straight().bits);
     // Longer, whole again, and what is missing is new.

@@ -1,7 +1,7 @@
 //! Network file systems that show late what another machine has written, or less of it than there is.
 
 use crate::place::{Place, checkpoint, computed};
-use crate::process::{expect, lampyris};
+use crate::process::{expect, lampyris, work};
 use std::fs;
 use std::path::Path;
 use std::process::Stdio;
@@ -45,4 +45,23 @@ fn what_never_comes_is_told_when_the_time_is_over() {
     assert!(said.contains("shard-000002.ckpt") && said.contains("truncated"), "{said}");
     fs::write(short, bytes).unwrap();
     expect(3, lampyris(&["merge", "--wait", "1"]).arg(&dir));
+}
+
+#[test]
+fn a_task_of_slurm_waits_for_a_plan_that_its_node_does_not_see_yet() {
+    let place = Place::new();
+    let dir = place.planned("dir");
+    let (plan, text) = (dir.join("plan.toml"), fs::read(dir.join("plan.toml")).unwrap());
+    fs::remove_file(&plan).unwrap();
+    let mut task = work(&dir, 0);
+    task.env("SLURM_ARRAY_JOB_ID", "12").env("SLURM_ARRAY_TASK_ID", "0").env("PATH", "");
+    let mut task = task.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    std::thread::sleep(A_WHILE);
+    assert!(task.try_wait().unwrap().is_none(), "it did not wait");
+    fs::write(&plan, text).unwrap();
+    assert_eq!(task.wait().unwrap().code(), Some(0));
+    assert!(dir.join(checkpoint(0)).exists());
+    // Started by hand, a worker says at once what is missing.
+    fs::remove_file(&plan).unwrap();
+    expect(2, &mut work(&dir, 1));
 }

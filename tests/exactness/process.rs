@@ -82,6 +82,8 @@ pub struct Stat {
     pub state: char,
     /// Status as `waitpid` will return it, once the process is a zombie.
     pub wait_status: i32,
+    /// Time of a processor that it has had [1/100 s].
+    pub ticks: u64,
 }
 
 /// None once it is reaped.
@@ -89,7 +91,8 @@ pub fn stat(pid: i32) -> Option<Stat> {
     let text = fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
     // The name stands in brackets and may hold anything.
     let fields: Vec<&str> = text.rsplit_once(')')?.1.split_whitespace().collect();
-    Some(Stat { state: fields[0].chars().next()?, wait_status: fields[49].parse().ok()? })
+    let ticks = fields[11].parse::<u64>().ok()? + fields[12].parse::<u64>().ok()?;
+    Some(Stat { state: fields[0].chars().next()?, wait_status: fields[49].parse().ok()?, ticks })
 }
 
 /// True while it runs: neither a zombie nor gone.

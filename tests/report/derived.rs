@@ -37,8 +37,8 @@ fn with_regions(n: u64) -> (Plan, Merged) {
         left.accumulate(&[if batch % 2 == 0 { 5.0 } else { 3.0 }], &[0.5]);
         lamp.accumulate(&[0.0], &[0.0]);
     }
-    result.sets.push(SetResult::Replicates { scores: left, fixed_direct: Vec::new() });
-    result.sets.push(SetResult::Replicates { scores: lamp, fixed_direct: Vec::new() });
+    result.sets.push(SetResult::Replicates { scores: left.into(), fixed_direct: Vec::new() });
+    result.sets.push(SetResult::Replicates { scores: lamp.into(), fixed_direct: Vec::new() });
     result.monitors.resize(result.sets.len(), Vec::new());
     (plan(&format!("{JOB}{PARTS}")), result)
 }
@@ -170,7 +170,9 @@ fn what_is_derived_has_the_marks_of_what_it_is_derived_from() {
     let (mut plan, mut result) = with_regions(20);
     plan.scene.narrowest_lobe = 0.0;
     let SetResult::Replicates { scores, .. } = &mut result.sets[2] else { panic!("the desk keeps its batches") };
-    scores.caustic[0] = 15.0;
+    let mut lit = scores.whole().unwrap();
+    lit.caustic[0] = 15.0;
+    *scores = lit.into();
     let s = summary(written(&plan, &result).path());
     let desk = &s["sets"][2]["derived"];
     let marks = |quantity: &serde_json::Value| quantity["marks"].to_string();

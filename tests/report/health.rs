@@ -72,7 +72,7 @@ fn a_variance_that_is_uncertain_is_noted_from_50_batches_on() {
         let mut scores = Replicates::new(6);
         // One batch of many is far off: VOV near 1.
         (0..n).for_each(|b| scores.accumulate(&[if b == 3 { 11.0 } else { 10.0 }; 6], &[0.25; 6]));
-        result.sets[2] = SetResult::Replicates { scores, fixed_direct: Vec::new() };
+        result.sets[2] = SetResult::Replicates { scores: scores.into(), fixed_direct: Vec::new() };
         let dir = written(&plan(JOB), &result);
         let mut reader = csv::Reader::from_path(dir.path().join("desk.csv")).unwrap();
         reader.records().next().unwrap().unwrap()[17].to_owned()
@@ -109,7 +109,7 @@ fn a_slow_tail_of_a_lux_meter_is_marked_everywhere() {
     let mut result = merged(64);
     let mut steep = replicates(1, 64);
     steep.value.iter_mut().for_each(|v| *v = 1.0 + 0.01 * *v);
-    result.sets[3] = SetResult::Replicates { scores: steep, fixed_direct: Vec::new() };
+    result.sets[3] = SetResult::Replicates { scores: steep.into(), fixed_direct: Vec::new() };
     // Survival t^(-3/2): the totals of an edge pixel in the plain estimate.
     // Two dozen histories make up the variance: enough for the tail to matter, too many for a mark of their own.
     let mut monitor = Monitor::new(0);

@@ -37,7 +37,7 @@ fn grid_notes_say_no_information_and_incomplete() {
     let mut result = merged(20);
     let mut scores = Replicates::new(6);
     (0..20).for_each(|_| scores.accumulate(&[0.0; 6], &[0.0; 6]));
-    result.sets[2] = SetResult::Replicates { scores, fixed_direct: vec![7.0; 6] };
+    result.sets[2] = SetResult::Replicates { scores: scores.into(), fixed_direct: vec![7.0; 6] };
     result.missing.push(20..24);
     let dir = written(&plan(JOB), &result);
     let (_, rows) = rows(&dir.path().join("desk.csv"));

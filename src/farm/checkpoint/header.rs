@@ -1,8 +1,9 @@
 //! What a checkpoint says about itself, and whether that can be true of a plan.
 
-use super::{Checksum, MAX_HEADER, Section, layout};
+use super::{Checksum, MAX_HEADER, Section, layout, part_count, tally_sections};
 use crate::farm::plan::Plan;
 use crate::job::SetShape;
+use crate::tally::FLUX_BINS;
 use serde::{Deserialize, Serialize};
 
 /// Longest name of instructions \[bytes\].
@@ -167,7 +168,7 @@ impl Header {
         }
         self.check_span(plan.job.run.batches_per_shard, span)?;
         self.check_runs()?;
-        if !self.sections.iter().map(|s| s.content).eq(layout(shapes)) {
+        if !self.sections.iter().map(|s| s.content).eq(layout(shapes, self.batches())) {
             return Err("damaged: its sections are not those of the plan".to_owned());
         }
         let looks = self.looks.iter().map(|look| look.batches);
@@ -220,7 +221,9 @@ impl Header {
 pub(super) fn longest(plan: &Plan, span: Option<u64>, shapes: &[SetShape]) -> u64 {
     let run = &plan.job.run;
     let batches = if span.is_some() { run.batches_per_shard } else { run.batches };
-    let sections = layout(shapes).len() as u64;
+    let of_tallies = shapes.iter().map(|shape| tally_sections(shape, batches) as u64).fold(0, u64::saturating_add);
+    let of_flux = u64::from(part_count(FLUX_BINS.len(), batches)) + 1;
+    let sections = of_tallies.saturating_add(of_flux).saturating_add(2 * shapes.len() as u64);
     let lists = batches.saturating_mul(HEADER_BATCH).saturating_add(sections.saturating_mul(HEADER_SECTION));
     lists.saturating_add(HEADER_REST).min(u64::from(MAX_HEADER))
 }

@@ -1,9 +1,9 @@
 //! Checkpoint file -> header, blocks, tally.
 
-use super::columns::{decode_moments, decode_replicates};
+use super::columns::{decode_moments, decode_scores};
 use super::header::longest;
 use super::{Checksum, Content, Header, MAGIC, PREAMBLE, Section, VERSION};
-use super::{block_count, block_range, checksum};
+use super::{block_count, block_range, checksum, part_count, part_range, tally_sections};
 use crate::error::{Error, Result};
 use crate::farm::folder::Folder;
 use crate::farm::plan::Plan;
@@ -112,8 +112,13 @@ impl Reader {
     /// # Errors
     /// [`Error::Refused`] for damage; [`Error::Io`].
     pub fn replicates(&self, set: usize) -> Result<Replicates> {
-        let (bins, batches) = (self.shapes[set].bins(), self.header.batches());
-        self.section(Content::Replicates { set: number(set) }, decode_replicates, |r| r.has_shape(bins, batches))
+        let mut all = self.extremes(set)?;
+        for part in 0..part_count(self.bins_of(set), self.header.batches()) {
+            let [value, direct] = self.scores(set, part)?;
+            all.value.extend(value);
+            all.direct.extend(direct);
+        }
+        Ok(all)
     }
 
     /// The flux balance, every batch.
@@ -121,8 +126,36 @@ impl Reader {
     /// # Errors
     /// [`Error::Refused`] for damage; [`Error::Io`].
     pub fn flux(&self) -> Result<Replicates> {
-        let batches = self.header.batches();
-        self.section(Content::Flux, decode_replicates, |r| r.has_shape(FLUX_BINS.len(), batches))
+        self.replicates(self.shapes.len())
+    }
+
+    /// Some scores and direct parts of a set of which every batch is kept, or of the flux balance after the last set.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] for damage; [`Error::Io`].
+    pub fn scores(&self, set: usize, part: u32) -> Result<[Vec<f64>; 2]> {
+        let bins = self.bins_of(set);
+        let entries = part_range(bins, self.header.batches(), part).len();
+        let content = Content::Scores { set: number(set), part };
+        self.section(content, |bytes| decode_scores(bytes, entries), |_| true)
+    }
+
+    /// What such a set keeps of all its batches together, as of no batch.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] for damage; [`Error::Io`].
+    pub fn extremes(&self, set: usize) -> Result<Replicates> {
+        let bins = self.bins_of(set);
+        let fits = |(peak, caustic, existed): &(Vec<f64>, Vec<f64>, Vec<u64>)| {
+            [peak.len(), caustic.len(), existed.len()] == [bins; 3]
+        };
+        let (peak, caustic, existed) = self.section(Content::Extremes { set: number(set) }, decode, fits)?;
+        Ok(Replicates { peak, caustic, existed, ..Replicates::new(bins) })
+    }
+
+    /// Number of bins of a set, or of the flux balance after the last set.
+    fn bins_of(&self, set: usize) -> usize {
+        self.shapes.get(set).map_or(FLUX_BINS.len(), SetShape::bins)
     }
 
     /// Direct light of a set that is the same in every batch; empty for zero everywhere.
@@ -212,19 +245,19 @@ impl Reader {
 
     /// Where `content` stands in the table, which was checked to be the layout of the plan.
     fn position(&self, content: Content) -> usize {
-        let count = |shape: &SetShape| match shape.kept {
-            Kept::Moments { .. } => block_count(shape) as usize,
-            Kept::EveryBatch => 1,
+        let batches = self.header.batches();
+        let before = |set: u32| -> usize {
+            self.shapes[..set as usize].iter().map(|shape| tally_sections(shape, batches)).sum()
         };
-        let before = |set: usize| self.shapes[..set].iter().map(count).sum::<usize>();
+        let behind_flux = || before(self.shapes.len() as u32) + part_count(FLUX_BINS.len(), batches) as usize + 1;
         match content {
-            Content::Moments { set, block } => before(set as usize) + block as usize,
-            Content::Replicates { set } => before(set as usize),
-            Content::Flux => before(self.shapes.len()),
-            Content::FixedDirect { set } => before(self.shapes.len()) + 1 + set as usize,
+            Content::Moments { set, block } => before(set) + block as usize,
+            Content::Scores { set, part } => before(set) + part as usize,
+            Content::Extremes { set } => before(set) + part_count(self.bins_of(set as usize), batches) as usize,
+            Content::FixedDirect { set } => behind_flux() + set as usize,
             Content::Monitors { set } => {
                 let monitored = self.shapes[..set as usize].iter().filter(|s| !s.monitored.is_empty());
-                before(self.shapes.len()) + 1 + self.shapes.len() + monitored.count()
+                behind_flux() + self.shapes.len() + monitored.count()
             }
         }
     }

@@ -98,7 +98,7 @@ fn newer_versions_other_plans_and_other_shards_are_named() {
     assert!(refusal(read_header(&path, &other, 1)).starts_with("of another plan: digest "));
     let header = read_header(&path, &plan, 1).unwrap().unwrap();
     fs::write(&path, frame(&header, VERSION + 1)).unwrap();
-    assert_eq!(refusal(read_header(&path, &plan, 1)), "format version 5 is newer; this program reads version 4");
+    assert_eq!(refusal(read_header(&path, &plan, 1)), "format version 6 is newer; this program reads version 5");
     fs::write(&path, "a letter to my aunt, long enough").unwrap();
     assert_eq!(refusal(read_header(&path, &plan, 1)), "not a checkpoint of lampyris");
 }
@@ -158,12 +158,12 @@ fn hostile_headers_are_refused_without_allocating_what_they_claim() {
 
 #[test]
 fn hostile_lengths_inside_a_section_are_refused() {
-    // The first list of the batch scores claims 2^63 entries.
+    // The first list of what all batches keep together claims 2^63 entries.
     let claim = |h: &mut Header, sections: &mut Vec<u8>| {
-        let scores = h.sections.iter_mut().find(|s| matches!(s.content, Content::Replicates { .. })).unwrap();
-        let bytes = &mut sections[scores.offset as usize..][..scores.bytes as usize];
-        bytes[1..11].copy_from_slice(&[0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x01]);
-        scores.checksum = checksum(bytes);
+        let extremes = h.sections.iter_mut().find(|s| matches!(s.content, Content::Extremes { .. })).unwrap();
+        let bytes = &mut sections[extremes.offset as usize..][..extremes.bytes as usize];
+        bytes[..10].copy_from_slice(&[0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x01]);
+        extremes.checksum = checksum(bytes);
     };
     assert!(forged(claim).contains("not of the plan's shape"));
     // A packed block that would be longer than a block of the plan.
@@ -282,8 +282,8 @@ fn golden_tally(plan: &Plan) -> Tally {
 }
 
 #[test]
-fn the_golden_file_of_version_4_is_read_and_written_bit_for_bit() {
-    let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/shard-v4.ckpt");
+fn the_golden_file_of_version_5_is_read_and_written_bit_for_bit() {
+    let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/shard-v5.ckpt");
     // The numbers of the program may change without changing the format.
     let plan = Plan { numerics: 1, ..small() };
     let (_temp, folder) = folder();
@@ -292,7 +292,7 @@ fn the_golden_file_of_version_4_is_read_and_written_bit_for_bit() {
     let written = fs::read(folder.shard_path(1)).unwrap();
     let stored = fs::read(&golden).unwrap_or_default();
     if written != stored {
-        let new = std::env::temp_dir().join("shard-v4.ckpt");
+        let new = std::env::temp_dir().join("shard-v5.ckpt");
         fs::write(&new, &written).unwrap();
         panic!("the bytes have changed: raise VERSION if that is meant; the new file is {}", new.display());
     }

@@ -1,13 +1,15 @@
 //! Tally -> checkpoint file.
 
-pub use super::columns::{encode_moments, encode_replicates};
-use super::{Checksum, Content, Header, Judged, MAGIC, Run, Section, Span, VERSION, block_range, checksum, layout};
+pub use super::columns::{encode_moments, encode_scores};
+use super::{
+    Checksum, Content, Header, Judged, MAGIC, Run, Section, Span, VERSION, block_range, checksum, layout, part_range,
+};
 use super::{Reader, read_header};
 use crate::error::{Error, Result};
 use crate::farm::durable;
 use crate::farm::plan::Plan;
 use crate::job::SetShape;
-use crate::tally::{SetTally, Tally};
+use crate::tally::{Replicates, SetTally, Tally};
 use serde::Serialize;
 use std::io::{self, Write};
 use std::path::Path;
@@ -78,7 +80,7 @@ pub fn write(path: &Path, snapshot: &Snapshot) -> Result<bool> {
 /// # Errors
 /// As [`write()`].
 pub fn write_draft(path: &Path, draft: &Draft, encode: Encode) -> Result<bool> {
-    let contents = layout(&draft.plan.sets());
+    let contents: Vec<Content> = layout(&draft.plan.sets(), draft.digests.len() as u64).collect();
     let header = header_bytes(draft, sections(&contents, encode).map_err(Error::io(path))?);
     durable::replace_if(path, |w| write_file(w, &header, &contents, encode), || may_replace(path, draft))
 }
@@ -136,14 +138,30 @@ fn encode(content: Content, snapshot: &Snapshot, shapes: &[SetShape]) -> Vec<u8>
             SetTally::Moments(m) => encode_moments(&m.bins, block_range(&shapes[set as usize], block)),
             SetTally::Replicates(_) => unreachable!("the layout follows what the set keeps"),
         },
-        Content::Replicates { set } => match &sets[set as usize] {
-            SetTally::Replicates(r) => encode_replicates(r),
-            SetTally::Moments(_) => unreachable!("the layout follows what the set keeps"),
-        },
-        Content::Flux => encode_replicates(&snapshot.tally.flux),
+        Content::Scores { set, part } => {
+            let scores = replicates(snapshot, set);
+            let entries = part_range(scores.bins as usize, snapshot.tally.batches(), part);
+            encode_scores(&scores.value[entries.clone()], &scores.direct[entries])
+        }
+        Content::Extremes { set } => encode_extremes(replicates(snapshot, set)),
         Content::FixedDirect { set } => encode_plain(&snapshot.fixed_direct[set as usize]),
         Content::Monitors { set } => encode_plain(&snapshot.tally.monitors[set as usize]),
     }
+}
+
+/// The batch scores of a set, or of the flux balance after the last one.
+fn replicates<'a>(snapshot: &Snapshot<'a>, set: u32) -> &'a Replicates {
+    match snapshot.tally.sets.get(set as usize) {
+        Some(SetTally::Replicates(scores)) => scores,
+        Some(SetTally::Moments(_)) => unreachable!("the layout follows what the set keeps"),
+        None => &snapshot.tally.flux,
+    }
+}
+
+/// What `scores` keeps of all batches together.
+pub fn encode_extremes(scores: &Replicates) -> Vec<u8> {
+    let Replicates { peak, caustic, existed, .. } = scores;
+    postcard::to_stdvec(&(peak, caustic, existed)).expect("plain data of known length always has a postcard form")
 }
 
 /// Fixed direct light of a set, or its monitors.

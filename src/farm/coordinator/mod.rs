@@ -52,6 +52,8 @@ pub enum Ended {
 
 /// Says whether the plan in a folder has reached its goal: a function of the checkpoints there.
 pub type GoalReached<'a> = &'a dyn Fn(&Folder) -> Result<bool>;
+/// Is told whenever a worker has finished its shard.
+pub type ShardDone<'a> = &'a dyn Fn(&Folder);
 
 /// Computes all that is unfinished of `plan` in `folder`; where the plan has a goal, until `goal_reached` says so of the
 /// folder.
@@ -59,7 +61,13 @@ pub type GoalReached<'a> = &'a dyn Fn(&Folder) -> Result<bool>;
 /// # Errors
 /// [`Error::Refused`] for a checkpoint that is damaged or foreign, and what a worker refuses;
 /// [`Error::Failed`] for a shard that fails three times without progress; those of `goal_reached`.
-pub fn run(folder: &Folder, plan: &Plan, options: Options, goal_reached: GoalReached) -> Result<Ended> {
+pub fn run(
+    folder: &Folder,
+    plan: &Plan,
+    options: Options,
+    goal_reached: GoalReached,
+    shard_done: ShardDone,
+) -> Result<Ended> {
     let shards = read_shards(folder, plan)?;
     let waiting: VecDeque<u64> = shards.iter().filter(|s| s.batches < s.of).map(|s| s.shard).collect();
     let mut watch = Watch::new(folder, plan, goal_reached);
@@ -75,7 +83,7 @@ pub fn run(folder: &Folder, plan: &Plan, options: Options, goal_reached: GoalRea
     let slots = workers_that_fit(plan, options.workers).min(waiting.len());
     let failures = vec![0; shards.len()];
     let mut progress = Progress::new(plan, &shards, options.quiet);
-    let mut crew = Crew { folder, plan, slots, waiting, running: Vec::new(), shards, failures };
+    let mut crew = Crew { folder, plan, slots, waiting, running: Vec::new(), shards, failures, shard_done };
     let ended = crew.work(&stop, &mut watch, &mut progress);
     // Whatever happened, nobody is left behind and every checkpoint is written.
     let dismissed = crew.dismiss();
@@ -120,6 +128,7 @@ struct Crew<'a> {
     shards: Vec<ShardStatus>,
     /// Of every shard, failures in a row without a new batch.
     failures: Vec<u32>,
+    shard_done: ShardDone<'a>,
 }
 
 impl Crew<'_> {
@@ -178,6 +187,7 @@ impl Crew<'_> {
         let done = now.batches >= now.of;
         self.shards[shard as usize] = now;
         if done {
+            (self.shard_done)(self.folder);
             return Ok(());
         }
         let failures = &mut self.failures[shard as usize];

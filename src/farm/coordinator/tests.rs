@@ -26,7 +26,8 @@ fn every_worker_is_waited_for_and_the_first_failure_said() {
     let running = (0..3).zip(children).map(|(shard, (child, _))| Worker::fake(shard, child)).collect();
     let shards = read_shards(&folder, &plan).unwrap();
     let (waiting, failures) = (VecDeque::new(), vec![0; 3]);
-    let mut crew = Crew { folder: &folder, plan: &plan, slots: 3, waiting, running, shards, failures };
+    let mut crew =
+        Crew { folder: &folder, plan: &plan, slots: 3, waiting, running, shards, failures, shard_done: &|_| {} };
     let failed = crew.dismiss().unwrap_err().to_string();
     assert!(failed.starts_with("shard 0: "), "{failed}");
     // Neither at work nor a zombie.

@@ -96,17 +96,17 @@ type Refusals = Vec<(PathBuf, String)>;
 pub(super) fn choose(plan: &Plan, folders: &[Folder]) -> Result<Vec<Candidate>> {
     let (mut folded, mut shards, mut refused) = (None, BTreeMap::new(), Refusals::new());
     for folder in folders {
-        let path = folder.compaction_path();
-        let header = read_compaction(folder, plan);
-        if let Some(new) = checked(plan, path, header, &mut refused)? {
-            folded = Some(consider(folded, new, &mut refused));
-        }
         for (shard, path) in folder.checkpoints()? {
             let header = read_header(&path, plan, shard);
             if let Some(new) = checked(plan, path, header, &mut refused)? {
                 let longest = consider(shards.remove(&shard), new, &mut refused);
                 shards.insert(shard, longest);
             }
+        }
+        // After the shards: what is compacted meanwhile is seen twice, and not missed.
+        let header = read_compaction(folder, plan);
+        if let Some(new) = checked(plan, folder.compaction_path(), header, &mut refused)? {
+            folded = Some(consider(folded, new, &mut refused));
         }
     }
     if let Some(folded) = &folded {

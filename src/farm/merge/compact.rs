@@ -9,10 +9,12 @@ use super::fold;
 use super::fold::Fold;
 use crate::error::{Error, Result};
 use crate::farm::checkpoint::{
-    Content, Draft, Span, encode_moments, encode_plain, encode_replicates, read_compaction, write_draft,
+    Content, Draft, Span, encode_extremes, encode_moments, encode_plain, encode_scores, part_range, read_compaction,
+    read_header, write_draft,
 };
 use crate::farm::folder::Folder;
 use crate::farm::plan::Plan;
+use crate::tally::EveryBatch;
 use std::fs;
 use std::io::{self, ErrorKind};
 
@@ -50,6 +52,21 @@ pub fn compact(folder: &Folder, written: u64) -> Result<Compacted> {
     Ok(Compacted { shards, files })
 }
 
+/// True when `shards` whole ones lie in files of their own right behind what is compacted. Reads no more headers than that.
+///
+/// # Errors
+/// Those of reading a header.
+pub fn is_due(folder: &Folder, plan: &Plan, shards: u64) -> Result<bool> {
+    let first = read_compaction(folder, plan)?.map_or(0, |header| header.shards());
+    let n = plan.job.run.batches_per_shard;
+    for shard in first..first.saturating_add(shards) {
+        if !read_header(&folder.shard_path(shard), plan, shard)?.is_some_and(|header| header.batches() == n) {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
 /// The files with which the plan begins: without a gap, each whole.
 fn beginning(plan: &Plan, files: Vec<Candidate>) -> Vec<Candidate> {
     let mut end = 0;
@@ -71,8 +88,12 @@ fn store(folder: &Folder, plan: &Plan, fold: &Fold, written: u64) -> Result<()> 
                 let block = fold.moments(set as usize).read(block as usize)?;
                 encode_moments(&block, 0..block.len())
             }
-            Content::Replicates { set } => encode_replicates(fold.replicates(set as usize)),
-            Content::Flux => encode_replicates(fold.flux()),
+            Content::Scores { set, part } => {
+                let rows = fold.rows(set as usize);
+                let [value, direct] = rows.entries(part_range(rows.bins(), fold.batches(), part))?;
+                encode_scores(&value, &direct)
+            }
+            Content::Extremes { set } => encode_extremes(&fold.rows(set as usize).extremes()),
             Content::FixedDirect { set } => encode_plain(&fold.fixed_direct()[set as usize]),
             Content::Monitors { set } => encode_plain(&fold.monitors()[set as usize]),
         })

@@ -12,13 +12,14 @@ use super::blocks::{Blocks, bytes_of};
 use super::choose::Candidate;
 use super::goal::{Goal, Look, Stopped};
 use super::passes::{Part, passes, take_blocks};
+use super::rows::Rows;
 use super::{Merged, SetResult};
 use crate::error::{Error, Result};
-use crate::farm::checkpoint::{BLOCK, Checksum, Judged, Reader, Run};
+use crate::farm::checkpoint::{BLOCK, Checksum, Judged, Reader, Run, part_count};
 use crate::farm::plan::Plan;
 use crate::job::{Kept, SetShape};
 use crate::tally::statistics::Estimate;
-use crate::tally::{FLUX_BINS, MomentBlock, Monitor, Replicates};
+use crate::tally::{EveryBatch, FLUX_BINS, MomentBlock, Monitor, Replicates};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -37,7 +38,7 @@ pub(super) struct Fold<'a> {
     read: Vec<usize>,
     sets: Vec<SetFold>,
     monitors: Vec<Vec<Monitor>>,
-    flux: Replicates,
+    flux: Rows,
     /// Direct light of the sets that are folded, with the file and the checksums it was taken from.
     fixed: Option<(PathBuf, Vec<Checksum>, Vec<Vec<f64>>)>,
     digests: Vec<Checksum>,
@@ -52,7 +53,7 @@ pub(super) struct Fold<'a> {
 /// One receiver set so far.
 enum SetFold {
     Moments(Blocks),
-    Replicates(Replicates),
+    Replicates(Rows),
 }
 
 impl<'a> Fold<'a> {
@@ -61,20 +62,22 @@ impl<'a> Fold<'a> {
         Fold::within(plan, read, scratch, MEMORY)
     }
 
-    /// The same with `memory` bytes for a pass.
+    /// The same with `memory` bytes for a pass, and a sixteenth of them for batch scores.
     pub fn within(plan: &'a Plan, read: Vec<usize>, scratch: &'a Path, memory: u64) -> Result<Self> {
         let shapes = plan.sets();
         let spilled = read.iter().map(|&set| bytes_of(&shapes[set])).sum::<u64>() > memory;
+        let rows_spilled = kept_bytes(plan, read.iter().map(|&set| &shapes[set])) > memory / 16;
+        let rows = |bins| Rows::new(bins, rows_spilled.then_some(scratch)).map_err(Error::io(scratch));
         let empty = |(set, shape): (usize, &SetShape)| match shape.kept {
             Kept::Moments { .. } => {
                 let place = (spilled && read.contains(&set)).then_some(scratch);
                 Blocks::new(shape, place).map(SetFold::Moments).map_err(Error::io(scratch))
             }
-            Kept::EveryBatch => Ok(SetFold::Replicates(Replicates::new(shape.bins()))),
+            Kept::EveryBatch => rows(shape.bins()).map(SetFold::Replicates),
         };
         let sets = shapes.iter().enumerate().map(empty).collect::<Result<_>>()?;
         let monitors = shapes.iter().map(Monitor::of_set).collect();
-        let (flux, goal, fixed) = (Replicates::new(FLUX_BINS.len()), Goal::of(plan), None);
+        let (flux, goal, fixed) = (rows(FLUX_BINS.len())?, Goal::of(plan), None);
         let (digests, runs, done, looks) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         let fold =
             Fold { plan, scratch, shapes, read, sets, monitors, flux, fixed, digests, runs, done, goal, looks, memory };
@@ -145,12 +148,12 @@ impl<'a> Fold<'a> {
         self.take_fixed(reader, &file.path)?;
         for &set in &self.read {
             if let SetFold::Replicates(scores) = &mut self.sets[set] {
-                scores.append(reader.replicates(set)?);
+                take_rows(scores, reader, set, self.scratch)?;
             }
             let next = reader.monitors(set)?;
             self.monitors[set].iter_mut().zip(next).for_each(|(monitor, next)| monitor.append(next));
         }
-        self.flux.append(reader.flux()?);
+        take_rows(&mut self.flux, reader, self.shapes.len(), self.scratch)?;
         let start = file.span.start(self.plan);
         self.done.push(start..start + reader.header().batches());
         self.digests.extend(&reader.header().digests);
@@ -221,8 +224,11 @@ impl<'a> Fold<'a> {
         let batches = self.batches();
         match &self.sets[set] {
             SetFold::Replicates(scores) => {
-                let all = (0..self.shapes[set].bins()).filter_map(|bin| scores.estimate(bin).with_fixed(fixed, bin));
-                all.for_each(take);
+                let of_group = |first: usize, group: &Replicates| {
+                    let estimate = |bin| group.estimate(bin).with_fixed(fixed, first + bin);
+                    (0..group.bins as usize).filter_map(estimate).for_each(&mut *take);
+                };
+                scores.each(&mut { of_group }).map_err(Error::io(self.scratch))?;
             }
             SetFold::Moments(blocks) => {
                 for i in 0..blocks.count() {
@@ -254,17 +260,13 @@ impl<'a> Fold<'a> {
         self.fixed.as_ref().map_or(&[][..], |(.., fixed)| fixed)
     }
 
-    /// Batch scores of the set number `set`.
-    pub fn replicates(&self, set: usize) -> &Replicates {
-        match &self.sets[set] {
-            SetFold::Replicates(scores) => scores,
-            SetFold::Moments(_) => unreachable!("the plan says what a set keeps"),
+    /// Batch scores of the set number `set`, or of the flux balance after the last one.
+    pub fn rows(&self, set: usize) -> &Rows {
+        match self.sets.get(set) {
+            Some(SetFold::Replicates(scores)) => scores,
+            Some(SetFold::Moments(_)) => unreachable!("the plan says what a set keeps"),
+            None => &self.flux,
         }
-    }
-
-    /// Flux balance of every batch.
-    pub fn flux(&self) -> &Replicates {
-        &self.flux
     }
 
     /// Monitored bins of each set.
@@ -319,6 +321,21 @@ impl<'a> Fold<'a> {
         }
         Merged { sets, monitors, flux, batches, missing, stopped, looks, seconds, instructions }
     }
+}
+
+/// Bytes of the batch scores of `shapes` and of the flux balance.
+fn kept_bytes<'a>(plan: &Plan, shapes: impl Iterator<Item = &'a SetShape>) -> u64 {
+    let kept = shapes.filter(|shape| shape.kept == Kept::EveryBatch).map(|shape| shape.bins() as u64);
+    (kept.sum::<u64>() + FLUX_BINS.len() as u64).saturating_mul(16 * plan.job.run.batches)
+}
+
+/// Takes the batch scores of the set number `set` out of a file, part by part.
+fn take_rows(rows: &mut Rows, reader: &Reader, set: usize, scratch: &Path) -> Result<()> {
+    rows.append(reader.extremes(set)?);
+    for part in 0..part_count(rows.bins(), reader.header().batches()) {
+        rows.extend(reader.scores(set, part)?).map_err(Error::io(scratch))?;
+    }
+    Ok(())
 }
 
 /// What `done`, in order, leaves of `0..batches`.

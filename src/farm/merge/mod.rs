@@ -19,14 +19,16 @@ pub mod compact;
 mod fold;
 pub mod goal;
 mod passes;
+mod rows;
 pub mod settle;
 
 pub use blocks::Blocks;
+pub use rows::Rows;
 
 use super::folder::Folder;
 use super::plan::Plan;
 use crate::error::{Error, Result};
-use crate::tally::{Monitor, Replicates};
+use crate::tally::Monitor;
 use choose::{Candidate, choose, common_plan};
 use fold::Fold;
 use goal::{Goal, Look, Stopped};
@@ -47,7 +49,7 @@ pub enum SetResult {
     /// Every batch's score, for grids and points, and the part that is the same in every batch.
     Replicates {
         /// Batch scores of each bin.
-        scores: Replicates,
+        scores: Rows,
         /// Direct light that is the same in every batch, one entry a bin (NaN: no receiver there, inside a solid
         /// or behind a surface), or empty for zero everywhere.
         fixed_direct: Vec<f64>,
@@ -62,7 +64,7 @@ pub struct Merged {
     /// For each receiver set its monitored bins, in their order.
     pub monitors: Vec<Vec<Monitor>>,
     /// Flux balance, every batch.
-    pub flux: Replicates,
+    pub flux: Rows,
     /// Batches merged.
     pub batches: u64,
     /// Batches of the plan that are missing, as half-open ranges; none when the goal has been reached.

@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::job::{Kept, ReceiverKind, SetShape};
 use crate::tally::{FLUX_BINS, LARGEST};
 
-/// Most memory that the batch scores kept by a whole job may take \[bytes\]: merging holds them all at once.
+/// Most that the batch scores kept by a whole job may take \[bytes\]: merging keeps them in a file.
 pub const KEPT_LIMIT: u64 = 2 << 30;
 /// Most shards of a job: each is a file, and one process start.
 pub const MAX_SHARDS: u64 = 100_000;
@@ -35,11 +35,11 @@ const WATCHED: u64 = 6 * NUMBER;
 pub struct Sizes {
     /// Memory of one worker.
     pub worker: u64,
-    /// Disk of one checkpoint of a whole shard; while it is replaced, twice that.
+    /// Disk of one checkpoint of a whole shard before it is packed; while it is replaced, twice that.
     pub checkpoint: u64,
     /// Disk of the checkpoints of all shards.
     pub checkpoints: u64,
-    /// Batch scores kept by the whole job, in memory while merging.
+    /// Batch scores kept by the whole job, in a file while merging where they are many.
     pub kept: u64,
 }
 

@@ -45,6 +45,8 @@ pub struct Request {
     pub sbatch: Option<String>,
     /// No script is written and nothing submitted, only said.
     pub dry_run: bool,
+    /// Whole shards that are folded into one file whenever so many have come together at the beginning; None for never.
+    pub compact: Option<u64>,
 }
 
 /// The shards of one array: its tasks are the shards less `first`.
@@ -143,7 +145,7 @@ impl Scripts {
         let root = script_path(folder.root(), FORBIDDEN)?;
         let extra = extra_lines(request)?;
         let (program, time) = (quoted(&this_program(FORBIDDEN)?), request.time);
-        let shards = script::shards(&root, &program, plan, time, &extra);
+        let shards = script::shards(&root, &program, plan, time, request.compact, &extra);
         let merge = script::merge(&root, &program, plan, time, &extra);
         Ok(Scripts { folder: root, shards, merge })
     }
@@ -203,7 +205,7 @@ fn commands(scripts: &Scripts, arrays: &[Array], limit: Option<u64>) -> String {
 fn nothing_to_submit(folder: &Folder, queued: &[u64], queue: &Queue) -> String {
     let folder = quoted(&folder.root().to_string_lossy());
     if queued.is_empty() {
-        return format!("nothing to submit: every shard is complete; `lampyris merge {folder}` writes the results\n");
+        return format!("nothing to submit: no shard is missing; `lampyris merge {folder}` writes the results\n");
     }
     let shards = list(queued.iter().copied());
     format!("nothing to submit: shards {shards} are queued or running (job {})\n", queue.job_list())

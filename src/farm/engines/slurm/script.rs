@@ -6,6 +6,8 @@ use crate::farm::plan::Plan;
 
 /// What a process takes beside what the plan counts \[bytes\].
 const MARGIN: u64 = 256 << 20;
+/// What a merge takes at most, whatever it merges \[bytes\]: moments and batch scores that do not fit wait in a file.
+const MERGE: u64 = 512 << 20;
 /// The merge waits so long for files that it does not see yet \[s\], and a third of its own time at most: NFS forgets what it
 /// remembers after 60 s at most.
 const LATE: u64 = 70;
@@ -17,10 +19,19 @@ pub(super) struct Script {
     pub text: String,
 }
 
-/// One array task computes one shard: `program`, quoted, works on the folder at `root`.
-pub(super) fn shards(root: &str, program: &str, plan: &Plan, time: TimeLimit, extra: &[String]) -> Script {
+/// One array task computes one shard: `program`, quoted, works on the folder at `root`, and compacts it wherever so many
+/// shards have come together.
+pub(super) fn shards(
+    root: &str,
+    program: &str,
+    plan: &Plan,
+    time: TimeLimit,
+    together: Option<u64>,
+    extra: &[String],
+) -> Script {
     let path = format!("{root}/slurm/shards.sbatch");
     let head = head(root, plan, "%A_%a", plan.sizes().worker, time, extra);
+    let compact = together.map_or_else(String::new, |together| format!(" --compact {together}"));
     let text = format!(
         "\
 #!/bin/bash
@@ -30,7 +41,7 @@ pub(super) fn shards(root: &str, program: &str, plan: &Plan, time: TimeLimit, ex
 
 # The worker takes the place of this shell, so that Slurm's signals reach it: at SIGTERM it writes a checkpoint and waits to be
 # killed; at SIGUSR2, before the time limit, it writes a checkpoint and requeues itself.
-exec {program} work {folder} --shard \"$((${{1:-0}} + SLURM_ARRAY_TASK_ID))\" --threads \"${{SLURM_CPUS_PER_TASK:-1}}\"
+exec {program} work {folder} --shard \"$((${{1:-0}} + SLURM_ARRAY_TASK_ID))\" --threads \"${{SLURM_CPUS_PER_TASK:-1}}\"{compact}
 ",
         last = plan.shard_count() - 1,
         script = quoted(&path),
@@ -43,8 +54,7 @@ exec {program} work {folder} --shard \"$((${{1:-0}} + SLURM_ARRAY_TASK_ID))\" --
 /// Merges what is there, and says what is missing.
 pub(super) fn merge(root: &str, program: &str, plan: &Plan, time: TimeLimit, extra: &[String]) -> Script {
     let path = format!("{root}/slurm/merge.sbatch");
-    let sizes = plan.sizes();
-    let head = head(root, plan, "merge-%j", sizes.worker.saturating_add(sizes.kept), time, extra);
+    let head = head(root, plan, "merge-%j", plan.sizes().worker.max(MERGE), time, extra);
     let text = format!(
         "\
 #!/bin/bash
@@ -93,7 +103,7 @@ mod tests {
     fn the_script_stands_on_its_own_and_quotes_what_a_shell_would_split() {
         let time: TimeLimit = "1:00:00".parse().unwrap();
         let extra = ["--partition=long".to_owned(), "--account=light -c 4".to_owned()];
-        let script = shards("/data/it's here", "'/opt/my lampyris'", &plan(), time, &extra);
+        let script = shards("/data/it's here", "'/opt/my lampyris'", &plan(), time, None, &extra);
         assert_eq!(script.path, "/data/it's here/slurm/shards.sbatch");
         let lines: Vec<&str> = script.text.lines().collect();
         for line in [

@@ -16,7 +16,7 @@ pub mod hosts;
 use super::missing::{Missing, list};
 use super::{not_started, quoted, script_path, this_program};
 use crate::error::{Error, Result};
-use crate::farm::checkpoint::read_header;
+use crate::farm::checkpoint::{Header, read_compaction, read_progress};
 use crate::farm::durable;
 use crate::farm::folder::Folder;
 use crate::farm::plan::Plan;
@@ -55,8 +55,8 @@ pub enum Ended {
     Stopped,
 }
 
-/// Computes what is missing of `plan` in `folder` on `hosts`: `missing` says what that is, from the folder; `say` tells
-/// the user.
+/// Computes what is missing of `plan` in `folder` on `hosts`: `missing` says what that is, from the folder; `visited`
+/// is told now and then while hosts are at work; `say` tells the user.
 ///
 /// # Errors
 /// [`Error::Failed`] where no host can be reached, GNU parallel is not there, or a round brings no new batch;
@@ -66,6 +66,7 @@ pub fn run(
     plan: &Plan,
     hosts: &[Host],
     missing: &dyn Fn() -> Result<Missing>,
+    visited: &dyn Fn(),
     say: &dyn Fn(&str),
 ) -> Result<Ended> {
     let stop = Arc::new(AtomicBool::new(false));
@@ -75,7 +76,7 @@ pub fn run(
     }
     let (root, program) = (script_path(folder.root(), FORBIDDEN)?, this_program(FORBIDDEN)?);
     durable::make_folder(&folder.root().join("ssh"))?;
-    let run = Run { folder, plan, hosts, root, program, say };
+    let run = Run { folder, plan, hosts, root, program, visited, say };
     let mut before = None;
     loop {
         let ready = run.ready();
@@ -108,6 +109,7 @@ struct Run<'a> {
     root: String,
     /// This program, on hosts that share it.
     program: String,
+    visited: &'a dyn Fn(),
     say: &'a dyn Fn(&str),
 }
 
@@ -176,12 +178,17 @@ impl Run<'_> {
     /// Looks again while `shards`, which are done, are not seen to be: the folder may be shown late.
     fn wait_for(&self, shards: &[u64]) {
         let begun = Instant::now();
-        let is_done = |k: u64| {
-            let header = read_header(&self.folder.shard_path(k), self.plan, k);
+        let is_done = |k: u64, folded: &[Header]| {
+            let header = read_progress(self.folder, self.plan, folded, k);
             let range = self.plan.shard(k);
             header.is_ok_and(|header| header.is_some_and(|header| header.batches() >= range.end - range.start))
         };
-        while begun.elapsed() < LATE && !shards.iter().all(|&k| is_done(k)) {
+        let all_done = || {
+            let folded = read_compaction(self.folder, self.plan).ok().flatten();
+            let folded = folded.map_or_else(Vec::new, |folded| folded.parts(self.plan));
+            shards.iter().all(|&k| is_done(k, &folded))
+        };
+        while begun.elapsed() < LATE && !all_done() {
             std::thread::sleep(POLL);
         }
     }
@@ -199,8 +206,11 @@ impl Run<'_> {
                 return end(parallel).map(|()| false);
             }
             std::thread::sleep(POLL);
-            if has_copies && visited.elapsed() > pause {
-                self.fetch(hosts)?;
+            if visited.elapsed() > pause {
+                if has_copies {
+                    self.fetch(hosts)?;
+                }
+                (self.visited)();
                 visited = Instant::now();
             }
         }
