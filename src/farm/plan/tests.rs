@@ -183,7 +183,7 @@ denominator = "desk"
     let text = JOB.replacen("batches = 10\n", "", 1);
     let whole = plan_of(&format!("scene = \"room.glb\"\n{text}{MORE}")).unwrap();
     let table = toml::Table::try_from(&whole.job).unwrap();
-    assert_eq!(table.len(), 18, "a table that this test does not know: {:?}", table.keys());
+    assert_eq!(table.len(), 18, "a key that this test does not know: {table}");
     let without = |keys: &[&str]| {
         let mut rest = table.clone();
         keys.iter().for_each(|key| drop(rest.remove(*key)));
