@@ -95,7 +95,7 @@ mod tests {
     fn names_are_listed_by_likeness() {
         let names = ["floor", "ceiling", "wall 0.6", "desk", "desk"];
         assert_eq!(listed("Dsk", names), "desk, floor, ceiling, wall 0.6");
-        assert_eq!(listed("wall", names), "wall 0.6, ceiling, desk, floor");
+        assert_eq!(listed("wall", names), "wall 0.6, desk, floor, ceiling");
         assert_eq!(listed("x", []), "there are none");
         let many: Vec<String> = (0..500).map(|i| format!("chair {i}")).collect();
         let text = listed("chair 77", many.iter().map(String::as_str));
