@@ -158,7 +158,7 @@ pub enum Command {
     Luminaire {
         /// An .ies or .ldt file.
         file: PathBuf,
-        /// The picture [default: the name of the file with .png, in the current folder].
+        /// The picture [default: the whole name of the file and .png, in the current folder].
         #[arg(short, long, value_name = "OUT.png")]
         output: Option<PathBuf>,
     },

@@ -7,10 +7,11 @@ use crate::cli::Command;
 use lampyris::error::{Error, Result};
 use lampyris::farm::audit::{self, audit};
 use lampyris::farm::coordinator::{self, Options};
+use lampyris::farm::durable::{check_output, replace};
 use lampyris::farm::engines::missing::Missing;
 use lampyris::farm::engines::slurm;
 use lampyris::farm::folder::{Folder, plan_text};
-use lampyris::farm::inputs::{Prepared, prepare, read_scene};
+use lampyris::farm::inputs::{MOST_TEXT, Prepared, prepare, read_at_most, read_scene};
 use lampyris::farm::merge::compact::Compacted;
 use lampyris::farm::merge::goal::Look;
 use lampyris::farm::merge::settle::wait_until_whole;
@@ -25,6 +26,7 @@ use lampyris::scene::photometric_web::Photometry;
 use lampyris::scene::{Tabulated, law_of_road};
 use lampyris::validate::{self, Found};
 use std::fs::OpenOptions;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Checkpoints that `status` reads through, for the goal, at most \[bytes\].
@@ -287,14 +289,13 @@ fn compact(dir: &Path) -> Result<Outcome> {
 /// Says what a photometric file holds, and draws its polar curves.
 fn luminaire(file: &Path, output: Option<PathBuf>) -> Result<Outcome> {
     let name = file.display().to_string();
-    let bytes = std::fs::read(file)
+    let bytes = read_at_most(file, MOST_TEXT)
         .map_err(|e| Error::input("command line", "FILE", &name, format!("an IES or EULUMDAT file ({e})")))?;
     let photometry = Photometry::parse(&name, &bytes)?;
-    let stem = file.file_stem().unwrap_or_default();
-    let picture = output.unwrap_or_else(|| Path::new(stem).with_extension("png"));
-    // A bare name has an empty parent, which is no folder that can be opened.
-    let picture = if picture.parent() == Some(Path::new("")) { Path::new(".").join(picture) } else { picture };
     let title = file.file_name().unwrap_or_default().to_string_lossy();
+    // With its whole name in front: a luminaire often comes as .ies and .ldt.
+    let picture = output.unwrap_or_else(|| PathBuf::from(format!("{title}.png")));
+    check_output(&picture, "png")?;
     report::write_polar(&picture, &title, &photometry)?;
     let text = format!("{}curves in {}\n", report::luminaire_text(&photometry), picture.display());
     Ok(Outcome { text, exit: Exit::Done })
@@ -307,12 +308,13 @@ fn reflectance(job: &Path) -> Result<Outcome> {
 
 /// Writes the tabulated law of an r-table.
 fn brdf(table: &Path, output: &Path) -> Result<Outcome> {
+    check_output(output, "brdf")?;
     let name = table.display().to_string();
-    let text = std::fs::read_to_string(table)
+    let bytes = read_at_most(table, MOST_TEXT)
         .map_err(|e| Error::input("command line", "TABLE", &name, format!("a text with an r-table ({e})")))?;
-    let law = law_of_road(&name, &text)?;
+    let law = law_of_road(&name, &String::from_utf8_lossy(&bytes))?;
     Tabulated::parse(&name, law.as_bytes())?;
-    std::fs::write(output, &law).map_err(Error::io(output))?;
+    replace(output, |to| to.write_all(law.as_bytes()))?;
     Ok(Outcome { text: format!("tabulated law in {}\n", output.display()), exit: Exit::Done })
 }
 

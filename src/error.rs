@@ -1,5 +1,9 @@
 //! One error type for the whole program, and the exit code each error stands for.
 
+mod words;
+
+pub use words::{in_words, listed};
+
 use std::path::{Path, PathBuf};
 
 /// What went wrong, in words a user can act on.
@@ -57,9 +61,25 @@ impl Error {
         Error::Input {
             file: file.to_string(),
             field: field.to_string(),
-            value: value.to_string(),
+            value: words::shown(&value.to_string()),
             allowed: allowed.to_string(),
         }
+    }
+
+    /// The same of the file called `file`: who finds that things do not fit together need not know where they were typed.
+    pub fn in_file(mut self, name: &str) -> Self {
+        if let Error::Input { file, .. } = &mut self {
+            *file = name.to_owned();
+        }
+        self
+    }
+
+    /// The same of the field `field`: who reads a file need not know where it was named.
+    pub fn in_field(mut self, name: &str) -> Self {
+        if let Error::Input { field, .. } = &mut self {
+            *field = name.to_owned();
+        }
+        self
     }
 
     /// An [`Error::Refused`] for the file at `path`.

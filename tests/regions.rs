@@ -163,9 +163,10 @@ fn refusal(builder: &Builder, regions: &str) -> String {
 #[test]
 fn nodes_that_are_not_there_twice_there_or_not_seen_are_refused() {
     let said = refusal(&furnished(), &by_node("Chair"));
-    let listed = "region[0].node = Chair: a node of the scene with a surface: Room, Floor, Table, Top, Shelf, Cellar, \
-                  Ceiling";
-    assert!(said.contains(listed), "{said}");
+    let listed = said.split_once("region[0].node = Chair: a node of the scene with a surface: ").unwrap().1;
+    let mut names: Vec<&str> = listed.split(", ").collect();
+    names.sort_unstable();
+    assert_eq!(names, ["Ceiling", "Cellar", "Floor", "Room", "Shelf", "Table", "Top"]);
     let said = refusal(&furnished(), &(by_node("Top") + &by_node("Cellar")));
     assert!(said.contains("region[1].node = Cellar: a node that is the first surface in the centre of at"), "{said}");
     let mut twice = furnished();
@@ -179,7 +180,7 @@ fn nodes_that_are_not_there_twice_there_or_not_seen_are_refused() {
         children.push(json!(node));
     }
     let said = refusal(&many, &by_node("Chair"));
-    assert!(said.contains("n11, n12, and 17 more") && !said.contains("n13"), "{said}");
+    assert!(said.contains(", and 17 more") && said.matches(", n").count() == 13, "{said}");
 }
 
 /// Six lux-meters between Sobolev's planes, none like another.

@@ -175,8 +175,24 @@ pub fn make_inside(path: &Path) -> Result<()> {
     }
 }
 
+/// Refuses the path of a file to write, as the command line has it, that does not end in `.<ending>`, for it may be that of an input, or
+/// lies in no folder.
+///
+/// # Errors
+/// [`Error::Input`].
+pub fn check_output(path: &Path, ending: &str) -> Result<()> {
+    let bad = |allowed: String| Err(Error::input("command line", "--output", path.display(), allowed));
+    match path.extension().is_some_and(|e| e == ending) {
+        false => bad(format!("a file name that ends in .{ending}")),
+        true if !folder_of(path).is_dir() => bad("a file in a folder that is there".to_owned()),
+        true => Ok(()),
+    }
+}
+
 fn folder_of(path: &Path) -> &Path {
-    path.parent().expect("replaced files lie in a folder")
+    let folder = path.parent().expect("replaced files have a name");
+    // A bare name has an empty parent, which is no folder that can be opened.
+    if folder == Path::new("") { Path::new(".") } else { folder }
 }
 
 /// Makes a rename or a new file in `folder` survive a power cut.

@@ -1,6 +1,8 @@
 //! Files -> plan and scene: a job file beside its inputs becomes a plan with every input known by content, and a
 //! planned folder becomes the scene again, from the copies it keeps.
 
+mod lengths;
+
 use super::degree;
 use super::folder::Folder;
 use super::pilot::bounds;
@@ -16,7 +18,13 @@ use crate::scene::photometric_web::Photometry;
 use crate::scene::{Model, Scene, Tabulated, gltf};
 use std::collections::HashMap;
 use std::fs;
+use std::io::Read as _;
 use std::path::{Component, Path};
+
+/// Longest text that somebody types or a laboratory writes \[bytes\].
+pub const MOST_TEXT: u64 = 1 << 24;
+/// Longest scene, and longest of its parts \[bytes\]: what the header of a .glb can say.
+const MOST_DATA: u64 = 1 << 32;
 
 /// A plan and the content of the files it was made from.
 #[derive(Debug)]
@@ -37,7 +45,7 @@ pub fn prepare(path: &Path) -> Result<Prepared> {
     let job_file = Input::of(&file_name(path), text.as_bytes());
     let inputs = files.iter().map(|(input, _): &(Input, Vec<u8>)| input.clone()).collect();
     let mut summary = summary(&scene);
-    summary.warnings.extend(lift_warning(&scene));
+    summary.warnings.extend(lengths::warnings(&job, &scene));
     summary.warnings.extend(ReceiverSet::check(&job, &scene, &file)?);
     Regions::check(&job, &scene, &file)?;
     let plan = Plan::new(&name, job, job_file.clone(), inputs, summary)?;
@@ -68,8 +76,10 @@ pub fn read_scene(path: &Path) -> Result<Scene> {
 
 fn read(path: &Path) -> Result<Read> {
     let file = path.display().to_string();
-    let bytes = fs::read(path).map_err(|e| Error::input("command line", "JOB", &file, format!("a job file ({e})")))?;
-    let text = String::from_utf8(bytes).map_err(|_| Error::input(&file, "(encoding)", "not UTF-8", "UTF-8 text"))?;
+    let bytes = read_at_most(path, MOST_TEXT)
+        .map_err(|e| Error::input("command line", "JOB", &file, format!("a job file ({e})")))?;
+    let text = String::from_utf8(bytes)
+        .map_err(|_| Error::input(&file, "(encoding)", "not UTF-8", "a job, which is a text in UTF-8"))?;
     let mut job = Job::parse(&text, &file)?;
     let mut files = Vec::new();
     let model = match &job.scene {
@@ -84,10 +94,14 @@ fn read(path: &Path) -> Result<Read> {
         job.tables().map(|(i, name)| read_table(path, i, name, &mut files)).collect::<Result<_>>()?;
     let kept = degree::is_open(&job).then(|| model.clone());
     // Planning asks few rays (one a pixel where a region names a node), and each worker builds the scene again.
-    let mut scene = Scene::built(furnished(model, &job, &file, (&series, &webs, &tables))?, &job, Build::Quick)?;
+    let built = |model, job: &Job| {
+        let model = furnished(model, job, &file, (&series, &webs, &tables))?;
+        Scene::built(model, job, Build::Quick).map_err(|error| error.in_file(&file))
+    };
+    let mut scene = built(model, &job)?;
     if let Some(model) = kept {
         degree::fix(&mut job, &scene);
-        scene = Scene::built(furnished(model, &job, &file, (&series, &webs, &tables))?, &job, Build::Quick)?;
+        scene = built(model, &job)?;
     }
     Ok(Read { job, scene, file, text, files })
 }
@@ -114,7 +128,8 @@ pub fn load_scene(folder: &Folder, plan: &Plan) -> Result<Scene> {
     let webs: Vec<Photometry> = webs.collect::<Result<_>>()?;
     let tables = of_tables.iter().map(|input| Tabulated::parse(&input.name, &folder.read_input(input)?));
     let tables: Vec<Tabulated> = tables.collect::<Result<_>>()?;
-    Scene::new(furnished(model, &plan.job, "plan", (&series, &webs, &tables))?, &plan.job)
+    let model = furnished(model, &plan.job, "plan", (&series, &webs, &tables))?;
+    Scene::new(model, &plan.job).map_err(|error| error.in_file("plan"))
 }
 
 /// The inputs of a plan by what they are for.
@@ -167,77 +182,83 @@ fn furnished(
     Ok(model)
 }
 
-/// The bytes of the file `name` beside the job at `job_path`, which names it in `field`; `what` says what it shall be.
-fn read_named(job_path: &Path, field: &str, name: &str, what: &str) -> Result<Vec<u8>> {
+/// The bytes of the file at `path`, at most `most` of them: a device may have no end.
+///
+/// # Errors
+/// Those of reading, and one for a longer file.
+pub fn read_at_most(path: &Path, most: u64) -> std::io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    fs::File::open(path)?.take(most + 1).read_to_end(&mut bytes)?;
+    match bytes.len() as u64 <= most {
+        true => Ok(bytes),
+        false => Err(std::io::Error::other(format!("it has more than {most} bytes"))),
+    }
+}
+
+/// The file `name` beside the job at `job_path`, which names it in `field`; `what` says what it shall be: its path, for errors, and its
+/// bytes, which are added to `files`.
+fn read_named(
+    job_path: &Path,
+    field: &str,
+    name: &str,
+    what: &str,
+    files: &mut Vec<(Input, Vec<u8>)>,
+) -> Result<(String, Vec<u8>)> {
     let path = job_path.parent().unwrap_or(Path::new("")).join(name);
-    fs::read(&path)
-        .map_err(|e| Error::input(job_path.display(), field, name, format!("{what}, relative to the job file ({e})")))
+    let bytes = read_at_most(&path, MOST_DATA).map_err(|e| {
+        Error::input(job_path.display(), field, name, format!("{what}, relative to the job file ({e})"))
+    })?;
+    files.push((Input::of(name, &bytes), bytes.clone()));
+    Ok((path.display().to_string(), bytes))
 }
 
 /// Reads the file `name` of the series of `[[replace]]` number `i` of the job at `job_path`, and adds it to `files`.
 fn read_series(job_path: &Path, i: usize, name: &str, files: &mut Vec<(Input, Vec<u8>)>) -> Result<File> {
-    let bytes = read_named(job_path, &format!("replace[{i}].harmonic"), name, "a .harmonic file")?;
-    let file = File::parse(name, &bytes)?;
-    files.push((Input::of(name, &bytes), bytes));
-    Ok(file)
+    let (path, bytes) = read_named(job_path, &format!("replace[{i}].harmonic"), name, "a .harmonic file", files)?;
+    File::parse(&path, &bytes)
 }
 
 /// Reads the table `name` of `[[material]]` number `i` of the job at `job_path`, and adds it to `files`.
 fn read_table(job_path: &Path, i: usize, name: &str, files: &mut Vec<(Input, Vec<u8>)>) -> Result<Tabulated> {
-    let bytes = read_named(job_path, &format!("material[{i}].file"), name, "a table of docs/brdf-format.md")?;
-    let table = Tabulated::parse(name, &bytes)?;
-    files.push((Input::of(name, &bytes), bytes));
-    Ok(table)
+    let what = "a table of docs/brdf-format.md";
+    let (path, bytes) = read_named(job_path, &format!("material[{i}].file"), name, what, files)?;
+    Tabulated::parse(&path, &bytes)
 }
 
 /// Reads the photometric file `name` of `job` at `job_path`, and adds it to `files`.
 fn read_web(job_path: &Path, job: &Job, name: &str, files: &mut Vec<(Input, Vec<u8>)>) -> Result<Photometry> {
     let first = job.luminaires.iter().position(|l| l.file == name).unwrap_or(0);
-    let bytes = read_named(job_path, &format!("luminaire[{first}].file"), name, "an IES or EULUMDAT file")?;
-    let web = Photometry::parse(name, &bytes)?;
-    files.push((Input::of(name, &bytes), bytes));
-    Ok(web)
+    let what = "an IES or EULUMDAT file";
+    let (path, bytes) = read_named(job_path, &format!("luminaire[{first}].file"), name, what, files)?;
+    Photometry::parse(&path, &bytes)
 }
 
 /// Loads the scene file `name` of the job at `job_path`; every file read is added to `files`, the scene first.
 fn read_model(job_path: &Path, name: &str, files: &mut Vec<(Input, Vec<u8>)>) -> Result<Model> {
-    let path = job_path.parent().unwrap_or(Path::new("")).join(name);
-    let bytes = read_named(job_path, "scene", name, "a .glb or .gltf file")?;
-    files.push((Input::of(name, &bytes), bytes.clone()));
+    let (path, bytes) = read_named(job_path, "scene", name, "a .glb or .gltf file", files)?;
     let mut fetch = |uri: &str| {
         if let Some((_, known)) = files[1..].iter().find(|(input, _)| input.name == uri) {
             return Ok(known.clone());
         }
-        let content = read_beside(&path, name, uri)?;
+        let content = read_beside(Path::new(&path), uri)?;
         files.push((Input::of(uri, &content), content.clone()));
         Ok(content)
     };
-    gltf::load(name, &bytes, &mut fetch)
+    gltf::load(&path, &bytes, &mut fetch)
 }
 
 /// A file that the scene at `path` refers to: below its folder, nowhere else.
 ///
 /// # Errors
-/// [`Error::Input`] for a path that leaves the folder, or a file that cannot be read.
-pub fn read_beside(path: &Path, scene: &str, uri: &str) -> Result<Vec<u8>> {
-    let refused = |allowed: String| Error::input(scene, "uri", uri, allowed);
+/// [`Error::Input`] for a path that leaves the folder, or a file that cannot be read; the scene knows the field.
+pub fn read_beside(path: &Path, uri: &str) -> Result<Vec<u8>> {
+    let refused = |allowed: String| Error::input(path.display(), "uri", uri, allowed);
     let inside = Path::new(uri).components().all(|c| matches!(c, Component::Normal(_)));
     if uri.is_empty() || !inside {
         return Err(refused("a file in the folder of the scene or below".to_owned()));
     }
     let beside = path.parent().unwrap_or(Path::new("")).join(uri);
-    fs::read(&beside).map_err(|e| refused(format!("a file that can be read ({e})")))
-}
-
-/// A warning where the scene is so large that f32 coordinates blur what stands in it.
-fn lift_warning(scene: &Scene) -> Option<String> {
-    let millimetres = 1e3 * scene.geometry.lift_length();
-    (millimetres > 1.0).then(|| {
-        format!(
-            "the scene is so large that its points are lifted {millimetres:.1} mm off their surfaces: receivers see \
-             through anything thinner or nearer than that; leave out far geometry"
-        )
-    })
+    read_at_most(&beside, MOST_DATA).map_err(|e| refused(format!("a file that can be read ({e})")))
 }
 
 fn summary(scene: &Scene) -> SceneSummary {

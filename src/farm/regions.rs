@@ -19,9 +19,6 @@ use crate::scene::{Nodes, Scene};
 use crate::tally::Scores;
 use std::ops::Range;
 
-/// Names that an error lists, at most.
-const MOST_NAMES: usize = 20;
-
 /// The regions of a job, in its order.
 pub struct Regions(Vec<Part>);
 
@@ -54,7 +51,8 @@ impl Regions {
             let runs = match (region.rectangle, &region.node) {
                 (None, Some(name)) => {
                     let field = format!("region[{i}].node");
-                    let node = find(&scene.nodes, name).map_err(|allowed| Error::input(file, &field, name, allowed))?;
+                    let node = scene.nodes.only_with_surface(name);
+                    let node = node.map_err(|allowed| Error::input(file, &field, name, allowed))?;
                     let seen = seen[at].get_or_insert_with(|| look(&CentreSight::new(scene, camera)));
                     let runs = runs_of(seen, &scene.nodes, node);
                     if runs.is_empty() {
@@ -111,24 +109,6 @@ impl Part {
     fn pixels(&self) -> impl Iterator<Item = usize> + '_ {
         self.runs.iter().cloned().flatten().map(|p| p as usize)
     }
-}
-
-/// The only node called `name`; else what would be allowed.
-fn find(nodes: &Nodes, name: &str) -> std::result::Result<usize, String> {
-    match nodes.called(name)[..] {
-        [node] => Ok(node),
-        [first, second, ..] => {
-            let [a, b] = [first, second].map(|place| nodes.list[place].index);
-            Err(format!("the name of one node: nodes[{a}] and nodes[{b}] of the scene both have it"))
-        }
-        [] => Err(format!("a node of the scene with a surface: {}", some(&nodes.names_with_surface()))),
-    }
-}
-
-/// As many of `names` as a reader will read.
-fn some(names: &[&str]) -> String {
-    let shown = names[..names.len().min(MOST_NAMES)].join(", ");
-    if names.len() > MOST_NAMES { format!("{shown}, and {} more", names.len() - MOST_NAMES) } else { shown }
 }
 
 fn unseen(region: &Region) -> String {

@@ -38,7 +38,7 @@ pub fn read(path: &Path, node: Option<&str>) -> Result<Soup> {
     let bytes = fs::read(path)
         .map_err(|e| Error::input("command line", "MESH", &name, format!("a .glb, .gltf or .obj file ({e})")))?;
     if !is_obj {
-        let model = gltf::load(&name, &bytes, &mut |uri| read_beside(path, &name, uri))?;
+        let model = gltf::load(&name, &bytes, &mut |uri| read_beside(path, uri))?;
         return of_node(&name, &model, node);
     }
     match node {

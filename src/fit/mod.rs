@@ -21,7 +21,7 @@ mod star_shape;
 mod text;
 
 use crate::error::{Error, Result};
-use crate::farm::durable::replace;
+use crate::farm::durable::{check_output, replace};
 use crate::geometry::harmonic::file::{File as Stored, Numbers};
 use crate::geometry::harmonic::{MAX_DEGREE, Series, Star, projection};
 use crate::math::{PI, pow, sin};
@@ -30,7 +30,7 @@ use radial::Radial;
 use solid::Solid;
 use star_shape::Centre;
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// The largest power of the Lanczos factor.
 pub const MAX_LANCZOS: f64 = 16.0;
@@ -71,16 +71,16 @@ struct Fitted {
 /// [`Error::Input`] for a mesh that is not closed or not star-shaped, with the place, and for whatever else is wrong in
 /// the request or in the file; [`Error::Io`].
 pub fn run(request: &Request) -> Result<String> {
-    let output = checked(request)?;
+    checked(request)?;
     let fitted = fit(request)?;
     let errors = Errors::measure(&fitted.solid, &fitted.centre, &fitted.radial, &fitted.star);
-    replace(&output, |to| to.write_all(&fitted.bytes))?;
-    let seen = picture::write(&output.with_extension("png"), request, &fitted)?;
+    replace(&request.output, |to| to.write_all(&fitted.bytes))?;
+    let seen = picture::write(&request.output.with_extension("png"), request, &fitted)?;
     Ok(text::report(request, &fitted, &errors, seen))
 }
 
-/// Refuses what is out of range; the file to write, with its folder.
-fn checked(request: &Request) -> Result<PathBuf> {
+/// Refuses what is out of range.
+fn checked(request: &Request) -> Result<()> {
     let bad = |field: &str, value: String, allowed: String| Err(Error::input("command line", field, value, allowed));
     if request.degree > MAX_DEGREE {
         return bad("--degree", request.degree.to_string(), format!("0 .. {MAX_DEGREE}"));
@@ -88,12 +88,7 @@ fn checked(request: &Request) -> Result<PathBuf> {
     if !(0.0..=MAX_LANCZOS).contains(&request.lanczos) {
         return bad("--lanczos", request.lanczos.to_string(), format!("0 .. {MAX_LANCZOS}"));
     }
-    let output = &request.output;
-    if output.extension().is_none_or(|e| e != "harmonic") || output.file_stem().is_none() {
-        return bad("--output", output.display().to_string(), "a file name that ends in .harmonic".to_owned());
-    }
-    // A bare name has an empty parent, which is no folder that can be opened.
-    Ok(if output.parent() == Some(Path::new("")) { Path::new(".").join(output) } else { output.clone() })
+    check_output(&request.output, "harmonic")
 }
 
 fn fit(request: &Request) -> Result<Fitted> {

@@ -18,7 +18,7 @@ pub fn parse(name: &str, bytes: &[u8]) -> Result<Soup> {
     let mut soup = Soup::default();
     for (i, line) in text.lines().enumerate() {
         let mut words = line.split_whitespace();
-        let bad = |value: &str, allowed: &str| Error::input(name, format!("line {}", i + 1), shown(value), allowed);
+        let bad = |value: &str, allowed: &str| Error::input(name, format!("line {}", i + 1), value, allowed);
         match words.next() {
             Some("v") => soup.positions.push(position(words).ok_or_else(|| bad(line, "`v` and three numbers [m]"))?),
             Some("f") => {
@@ -49,11 +49,6 @@ fn corner(word: &str, count: usize) -> Option<u32> {
     let number: i64 = word.split('/').next()?.parse().ok()?;
     let index = if number < 0 { number.checked_add(count as i64)? } else { number - 1 };
     u32::try_from(index).ok().filter(|&index| (index as usize) < count)
-}
-
-/// `text` cut to what fits in a message.
-fn shown(text: &str) -> String {
-    text.chars().take(80).filter(|c| !c.is_control()).collect()
 }
 
 #[cfg(test)]

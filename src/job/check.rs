@@ -4,8 +4,8 @@ use super::{
     Camera, Degree, DegreeWord, Estimator, Gonio, Grid, Job, Kept, Ratio, ReceiverKind, Region, Replacement, Roulette,
     Sampling, Stop, lights, material, sky,
 };
-use crate::error::{Error, Result};
-use std::collections::HashSet;
+use crate::error::{Error, Result, listed};
+use std::collections::{HashMap, HashSet};
 use std::fmt::Debug;
 
 /// Largest picture: 2^28 pixels.
@@ -97,16 +97,16 @@ fn check_stop(c: &Checker, stop: &Stop, job: &Job) -> Result<()> {
     let sets = job.sets();
     let names: Vec<&str> = sets.iter().map(|s| s.name.as_str()).collect();
     for (i, name) in stop.receivers.iter().enumerate() {
-        let allowed = format!("one of {}", names.join(", "));
+        let allowed = format!("one of {}", listed(name, names.iter().copied()));
         c.that(&format!("stop.receivers[{i}]"), name, names.contains(&name.as_str()), &allowed)?;
     }
     Ok(())
 }
 
 fn check_region(c: &Checker, at: &str, region: &Region, job: &Job) -> Result<()> {
-    let cameras: Vec<&str> = job.cameras.iter().map(|c| c.name.as_str()).collect();
     let Some(camera) = job.cameras.iter().find(|k| k.name == region.camera) else {
-        let allowed = format!("the name of a [[camera]]: {}", cameras.join(", "));
+        let cameras = job.cameras.iter().map(|c| c.name.as_str());
+        let allowed = format!("the name of a [[camera]]: {}", listed(&region.camera, cameras));
         return Err(Error::input(c.file, format!("{at}.camera"), &region.camera, allowed));
     };
     match (region.rectangle, &region.node) {
@@ -137,9 +137,11 @@ fn check_ratios(c: &Checker, job: &Job) -> Result<()> {
 
 fn check_ratio(c: &Checker, at: &str, ratio: &Ratio, job: &Job) -> Result<()> {
     let kept: Vec<String> = job.sets().into_iter().filter(|s| s.kept == Kept::EveryBatch).map(|s| s.name).collect();
-    let allowed = format!("a grid with keep_batches, a point or a region: {}", kept.join(", "));
-    c.that(&format!("{at}.numerator"), &ratio.numerator, kept.contains(&ratio.numerator), &allowed)?;
-    c.that(&format!("{at}.denominator"), &ratio.denominator, kept.contains(&ratio.denominator), &allowed)
+    [("numerator", &ratio.numerator), ("denominator", &ratio.denominator)].into_iter().try_for_each(|(field, name)| {
+        let names = listed(name, kept.iter().map(String::as_str));
+        let allowed = format!("a grid with keep_batches, a point or a region: {names}");
+        c.that(&format!("{at}.{field}"), name, kept.contains(name), &allowed)
+    })
 }
 
 fn check_monitor(c: &Checker, at: &str, monitor: &[[u32; 2]], width: u32, height: u32) -> Result<()> {
@@ -198,18 +200,23 @@ fn check_sampling(c: &Checker, job: &Job) -> Result<()> {
 }
 
 fn check_names(c: &Checker, job: &Job) -> Result<()> {
-    let mut seen = HashSet::new();
+    let mut seen: HashMap<String, String> = HashMap::new();
     let sets = job.sets();
     c.that("receivers", sets.len(), !sets.is_empty(), "at least one [[camera]], [[grid]], [[point]] or [[gonio]]")?;
-    for set in &sets {
-        let name = set.name.as_str();
-        c.name("name", name)?;
+    for (i, set) in sets.iter().enumerate() {
+        // Sets of a kind stand together.
+        let index = i - sets.partition_point(|other| (other.kind as u8) < set.kind as u8);
+        let (entry, name) = (format!("{}[{index}]", set.kind.table()), set.name.as_str());
+        let field = format!("{entry}.name");
+        c.name(&field, name)?;
         // Results are files named after their sets; `points.csv`, `regions.csv` and `summary.json` are already taken.
         // Capitals do not distinguish files everywhere.
         let plain = name.to_ascii_lowercase();
         let free = !["points", "regions", "summary", "flux"].contains(&plain.as_str());
-        c.that("name", name, free, "any name but points, regions, summary and flux")?;
-        c.that("name", name, seen.insert(plain), "a name used only once")?;
+        c.that(&field, name, free, "any name but points, regions, summary and flux")?;
+        if let Some(other) = seen.insert(plain, entry) {
+            c.that(&field, name, false, &format!("a name used only once: {other} has it"))?;
+        }
     }
     Ok(())
 }

@@ -106,6 +106,20 @@ pub enum Source {
     },
 }
 
+impl Source {
+    /// Its place, or its middle \[m\].
+    pub fn position(&self) -> [f64; 3] {
+        match self {
+            Source::Omni { position, .. }
+            | Source::Spot { position, .. }
+            | Source::CosPower { position, .. }
+            | Source::Rectangle { position, .. }
+            | Source::Disc { position, .. }
+            | Source::Sphere { position, .. } => *position,
+        }
+    }
+}
+
 /// `[[luminaire]]`: the photometric web of an IES or EULUMDAT file at a place.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -234,12 +248,12 @@ fn check_area(
     reflectance: f64,
 ) -> Result<()> {
     c.position(&format!("{at}.position"), place)?;
-    for length in lengths {
-        let fits = (SHORTEST..=LONGEST).contains(length);
-        c.that(&format!("{at}.{name}"), length, fits, "1e-6 .. 1e6 m")?;
-    }
-    let given = usize::from(luminance.is_some()) + usize::from(flux.is_some());
-    c.that(at, format!("{given} of them"), given == 1, "either luminance or flux")?;
+    let fits = lengths.iter().all(|length| (SHORTEST..=LONGEST).contains(length));
+    let shown = if let [length] = lengths { length.to_string() } else { format!("{lengths:?}") };
+    c.that(&format!("{at}.{name}"), shown, fits, "1e-6 .. 1e6 m")?;
+    let both = luminance.is_some();
+    let allowed = "either luminance or flux";
+    c.that(at, if both { "(both)" } else { "(neither)" }, both != flux.is_some(), allowed)?;
     for (name, value) in [("luminance", luminance), ("flux", flux)] {
         let fits = value.is_none_or(|x| x > 0.0 && x <= MOST_LIGHT);
         c.that(&format!("{at}.{name}"), value.unwrap_or_default(), fits, "above 0, at most 1e12")?;

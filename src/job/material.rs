@@ -83,7 +83,7 @@ pub enum Material {
 
 /// A share of light: of all channels, or of red, green and blue.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "a number, or [red, green, blue]")]
 pub enum Share {
     /// Of all channels.
     Grey(f64),
@@ -98,6 +98,20 @@ impl Share {
             Share::Grey(share) => [share; 3],
             Share::Rgb(channels) => channels,
         }
+    }
+}
+
+impl std::fmt::Display for Share {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.write_str(&shown(self.channels()))
+    }
+}
+
+/// Shares as they are typed.
+fn shown(channels: [f64; 3]) -> String {
+    match channels.map(f64::to_bits) {
+        [r, g, b] if r == g && g == b => channels[0].to_string(),
+        _ => format!("{channels:?}"),
     }
 }
 
@@ -139,8 +153,9 @@ pub(super) fn check(c: &Checker, job: &Job) -> Result<()> {
     for (i, material) in job.materials.iter().enumerate() {
         let (at, name) = (format!("material[{i}]"), material.name());
         c.that(&format!("{at}.name"), name, job.scene.is_some(), "a material only with a scene")?;
-        let twice = job.materials.iter().filter(|other| other.name() == name).count() > 1;
-        c.that(&format!("{at}.name"), name, !twice, "each material once")?;
+        if let Some(first) = job.materials[..i].iter().position(|other| other.name() == name) {
+            c.that(&format!("{at}.name"), name, false, &format!("each material once: material[{first}] has it"))?;
+        }
         check_law(c, &at, material)?;
     }
     Ok(())
@@ -149,13 +164,13 @@ pub(super) fn check(c: &Checker, job: &Job) -> Result<()> {
 fn check_law(c: &Checker, at: &str, material: &Material) -> Result<()> {
     let share = |field: &str, share: &Share| {
         let fits = share.channels().iter().all(|x| (0.0..=1.0).contains(x));
-        c.that(&format!("{at}.{field}"), format!("{:?}", share.channels()), fits, "0 .. 1")
+        c.that(&format!("{at}.{field}"), share, fits, "0 .. 1")
     };
     let together = |field: &str, a: &Share, b: &Share, other: &str| {
         let sum: [f64; 3] = std::array::from_fn(|k| a.channels()[k] + b.channels()[k]);
         let fits = sum.iter().all(|&x| x <= 1.0 + NIL);
         let allowed = format!("at most 1 with {other}: no surface reflects and transmits more than it receives");
-        c.that(&format!("{at}.{field}"), format!("{:?} in all", sum), fits, &allowed)
+        c.that(&format!("{at}.{field}"), format!("{} in all", shown(sum)), fits, &allowed)
     };
     let index = |ior: f64| c.that(&format!("{at}.ior"), ior, (1.0..=MOST_INDEX).contains(&ior), "1 .. 10");
     match material {
@@ -182,7 +197,7 @@ fn check_law(c: &Checker, at: &str, material: &Material) -> Result<()> {
             share("transmittance_per_metre", transmittance_per_metre)?;
             let clear = transmittance_per_metre.channels();
             let fits = clear.iter().all(|&t| t > 0.0);
-            c.that(&format!("{at}.transmittance_per_metre"), format!("{clear:?}"), fits, "above 0, at most 1")
+            c.that(&format!("{at}.transmittance_per_metre"), shown(clear), fits, "above 0, at most 1")
         }
         Material::Tabulated { .. } => Ok(()),
     }

@@ -4,6 +4,7 @@
 //! the job file. Unknown keys are refused. A [`Job`] is plain data: reading it opens one file and nothing else.
 
 mod check;
+mod form;
 mod lights;
 mod material;
 mod receivers;
@@ -225,7 +226,7 @@ pub struct Ratio {
 
 /// Unbiased Russian roulette.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "a number above 0, at most 1, or \"analog\"")]
 pub enum Roulette {
     /// Weights below this share of the first weight are played for.
     Below(f64),
@@ -294,11 +295,9 @@ impl Job {
     /// # Errors
     /// [`Error::Input`] naming the field, its value and the allowed range.
     pub fn parse(text: &str, file: &str) -> Result<Job> {
-        let toml = toml::Deserializer::parse(text).map_err(|e| syntax_error(file, text, "(syntax)", &e))?;
-        let mut job: Job = serde_path_to_error::deserialize(toml).map_err(|e| {
-            let field = e.path().to_string();
-            syntax_error(file, text, &field, e.inner())
-        })?;
+        // Some editors begin a file with a mark of its encoding.
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+        let mut job = form::job(text, file)?;
         let typed = Typed::of(text);
         if let Some(stop) = &job.stop {
             check::check_typed_batches(typed.batches, stop, file)?;
@@ -373,12 +372,4 @@ impl Typed {
 
 fn whole() -> f64 {
     1.0
-}
-
-/// A TOML or type error as an input error: the value is the text of the line where it was found.
-fn syntax_error(file: &str, text: &str, field: &str, error: &toml::de::Error) -> Error {
-    let offset = error.span().map_or(0, |s| s.start);
-    let line = text[..offset.min(text.len())].matches('\n').count();
-    let value = text.lines().nth(line).unwrap_or("").trim();
-    Error::input(file, format!("{field} (line {})", line + 1), value, error.message())
 }

@@ -156,6 +156,19 @@ pub enum ReceiverKind {
     Region,
 }
 
+impl ReceiverKind {
+    /// What its tables are called in a job file.
+    pub fn table(self) -> &'static str {
+        match self {
+            ReceiverKind::Camera => "camera",
+            ReceiverKind::Gonio => "gonio",
+            ReceiverKind::Grid => "grid",
+            ReceiverKind::Point => "point",
+            ReceiverKind::Region => "region",
+        }
+    }
+}
+
 /// Name, size and keeping of one receiver set: all that plans, tallies and checkpoints know of it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SetShape {

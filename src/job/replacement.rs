@@ -20,7 +20,7 @@ pub struct Replacement {
 
 /// Degree of a series.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "a whole number, or \"auto\"")]
 pub enum Degree {
     /// This one.
     Number(u32),

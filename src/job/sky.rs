@@ -45,7 +45,7 @@ pub struct Sky {
 
 /// Distribution of the luminance of the sky.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(untagged, expecting = "allowed: \"uniform\", \"overcast\" or 1 .. 15, a type of the CIE standard general sky")]
+#[serde(untagged, expecting = "\"uniform\", \"overcast\" or 1 .. 15, a type of the CIE standard general sky")]
 pub enum SkyModel {
     /// Type 1 ..= 15 of the CIE standard general sky (CIE S 011, ISO 15469).
     Standard(u8),
@@ -117,8 +117,9 @@ fn check_sky(c: &Checker, job: &Job, sky: &Sky) -> Result<()> {
         c.that("sky.model", number, (1..=15).contains(&number), "uniform, overcast, or a CIE type 1 .. 15")?;
     }
     let scales = [("zenith_luminance", sky.zenith_luminance), ("horizontal_illuminance", sky.horizontal_illuminance)];
-    let given = scales.iter().filter(|(_, scale)| scale.is_some()).count();
-    c.that("sky", format!("{given} of them"), given == 1, "either zenith_luminance or horizontal_illuminance")?;
+    let [zenith, horizontal] = scales.map(|(_, scale)| scale.is_some());
+    let allowed = "either zenith_luminance or horizontal_illuminance";
+    c.that("sky", if zenith { "(both)" } else { "(neither)" }, zenith != horizontal, allowed)?;
     for (name, scale) in scales {
         let fits = scale.is_none_or(|x| x > 0.0 && x <= MOST_DAYLIGHT);
         c.that(&format!("sky.{name}"), scale.unwrap_or_default(), fits, "above 0, at most 1e9")?;

@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::farm::durable::replace;
 use crate::math::{DMat3, DVec3, PI, atan2, sin_cos};
 use crate::photometry::Colour;
-use crate::scene::photometric_web::{Luminaire, Photometry, Placement, Symmetry};
+use crate::scene::photometric_web::{Kind, Luminaire, Photometry, Placement, Symmetry};
 use std::path::Path;
 
 const WIDTH: u32 = 680;
@@ -34,14 +34,19 @@ pub fn write_polar(path: &Path, title: &str, photometry: &Photometry) -> Result<
     canvas.text([12, 34], &subtitle, Font::Small);
     let scale = Scale::up_to(peak, colorous::GREYS);
     draw_web(&mut canvas, &scale);
-    let placement = Placement::new(DVec3::ZERO, DMat3::IDENTITY, DVec3::NEG_Y, DVec3::X);
-    let placement = placement.expect("down and right are not parallel");
-    let luminaire = Luminaire::new(photometry, &placement, Colour::WHITE);
+    let luminaire = hanging(photometry);
     for (k, (azimuth, colour)) in planes(photometry, &luminaire).into_iter().zip(COLOURS).enumerate() {
         canvas.stroke(&curve(&luminaire, &scale, azimuth), 2.0, colour);
-        legend(&mut canvas, k as u32, azimuth, colour);
+        let text = halves(photometry, azimuth);
+        legend(&mut canvas, k as u32, &text, colour);
     }
     replace(path, |to| canvas.write_png(to))
+}
+
+/// The luminaire at the origin, its aim down and C0 on the right.
+fn hanging(photometry: &Photometry) -> Luminaire {
+    let placement = Placement::new(DVec3::ZERO, DMat3::IDENTITY, DVec3::NEG_Y, DVec3::X);
+    Luminaire::new(photometry, &placement.expect("down and right are not parallel"), Colour::WHITE)
 }
 
 /// The point of the picture in the direction `angle` from the aim at `share` of the radius.
@@ -96,20 +101,63 @@ fn planes(photometry: &Photometry, luminaire: &Luminaire) -> Vec<f64> {
 
 /// The intensities around the plane of the azimuth `azimuth`, which lies on the right.
 fn curve(luminaire: &Luminaire, scale: &Scale, azimuth: f64) -> Vec<[f64; 2]> {
-    let (sin, cos) = sin_cos(azimuth);
-    let point = |angle: f64| {
-        let (across, along) = sin_cos(angle);
-        let direction = DVec3::new(across * cos, -along, -across * sin);
-        place(angle, scale.position(luminaire.intensity(direction).luminance()))
-    };
-    turn().map(point).collect()
+    turn().map(|angle| place(angle, scale.position(intensity(luminaire, azimuth, angle)))).collect()
 }
 
-/// A line and the names of the half planes to the left and to the right.
-fn legend(canvas: &mut Canvas, row: u32, azimuth: f64, colour: Rgb) {
-    let y = HEIGHT - 70 + 20 * row;
+/// Intensity at `angle` from the aim in the plane of the azimuth `azimuth`; from 0 to pi it lies on the right \[cd\].
+fn intensity(luminaire: &Luminaire, azimuth: f64, angle: f64) -> f64 {
+    let ((sin, cos), (across, along)) = (sin_cos(azimuth), sin_cos(angle));
+    luminaire.intensity(DVec3::new(across * cos, -along, -across * sin)).luminance()
+}
+
+/// What lies to the left and to the right in the plane of the azimuth `azimuth`, by the angles of the file.
+fn halves(photometry: &Photometry, azimuth: f64) -> String {
     let right = azimuth * 180.0 / PI;
+    let (left, right) = match photometry.measured.kind {
+        Kind::C => (format!("C{}", label(right + 180.0)), format!("C{}", label(right))),
+        // Vertical 90 is the C0 direction, and horizontal angles run clockwise: C90 is horizontal -90.
+        Kind::A | Kind::B if right == 0.0 => ("vertical -90".to_owned(), "vertical 90".to_owned()),
+        Kind::A | Kind::B if right == 90.0 => ("horizontal 90".to_owned(), "horizontal -90".to_owned()),
+        Kind::A | Kind::B => return "the plane through the aim and the largest intensity".to_owned(),
+    };
+    format!("{left} on the left, {right} on the right")
+}
+
+/// A line and what it shows.
+fn legend(canvas: &mut Canvas, row: u32, text: &str, colour: Rgb) {
+    let y = HEIGHT - 70 + 20 * row;
     canvas.stroke(&[[20.0, f64::from(y) + 7.0], [60.0, f64::from(y) + 7.0]], 2.0, colour);
-    let text = format!("C{} on the left, C{} on the right", label(right + 180.0), label(right));
-    canvas.text([70, y], &text, Font::Small);
+    canvas.text([70, y], text, Font::Small);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_legend_says_which_side_is_which() {
+        let file = include_bytes!("../../tests/luminaires/type_b.ies");
+        let photometry = Photometry::parse("type_b.ies", file).unwrap();
+        let measured = &photometry.measured;
+        let at = |list: &[f64], angle: f64| list.iter().position(|a| *a == angle).unwrap();
+        let given = |horizontal: f64, vertical: f64| {
+            measured.candela[at(&measured.planes, horizontal) * measured.angles.len() + at(&measured.angles, vertical)]
+        };
+        assert_ne!(given(30.0, 0.0), given(-30.0, 0.0));
+        let luminaire = hanging(&photometry);
+        let drawn = |azimuth: f64, degrees: f64| intensity(&luminaire, azimuth * PI / 180.0, degrees * PI / 180.0);
+        let words = [
+            "vertical -90 on the left, vertical 90 on the right",
+            "horizontal 90 on the left, horizontal -90 on the right",
+        ];
+        assert_eq!([0.0, 0.5 * PI].map(|azimuth| halves(&photometry, azimuth)), words);
+        for (is, shall_be) in [
+            (drawn(0.0, 30.0), given(0.0, 30.0)),
+            (drawn(0.0, -30.0), given(0.0, -30.0)),
+            (drawn(90.0, 30.0), given(-30.0, 0.0)),
+            (drawn(90.0, -30.0), given(30.0, 0.0)),
+        ] {
+            assert!((is / shall_be - 1.0).abs() < 1e-9, "{is} is not {shall_be}");
+        }
+    }
 }

@@ -105,13 +105,10 @@ impl Model {
 
     /// From the coordinates of the one node called `name` to those of the world.
     fn only_node(&self, job: &str, at: &str, name: &str) -> Result<DMat4> {
-        match self.nodes.called(name)[..] {
-            [place] => Ok(self.nodes.list[place].world),
-            ref places => {
-                let allowed = format!("the name of one node of the scene, not of {}", places.len());
-                Err(Error::input(job, format!("{at}.node"), name, allowed))
-            }
-        }
+        let names: Vec<&str> = self.nodes.list.iter().filter_map(|node| node.name.as_deref()).collect();
+        let place = self.nodes.only(name, ("a node of the scene", &names));
+        let place = place.map_err(|allowed| Error::input(job, format!("{at}.node"), name, allowed))?;
+        Ok(self.nodes.list[place].world)
     }
 
     /// Adds a warning that is not there yet: many luminaires share a file.

@@ -34,11 +34,7 @@ impl Model {
     /// [`Error::Input`] where there is not one such node, or no luminous mesh hangs there.
     pub(super) fn take_mesh(&mut self, (job, at): (&str, &str), name: &str) -> Result<LuminousMesh> {
         let bad = |allowed: String| Error::input(job, format!("{at}.mesh"), name, allowed);
-        let places = self.nodes.called(name);
-        let &[place] = &places[..] else {
-            let names = self.nodes.names_with_surface().join(", ");
-            return Err(bad(format!("the name of one node, not of {}: {names}", places.len())));
-        };
+        let place = self.nodes.only_with_surface(name).map_err(bad)?;
         let below = self.nodes.at_or_below(place);
         let is_its = |t: usize| self.nodes.of_triangle.get(t).is_some_and(|&of| below[of as usize]);
         let its: Vec<usize> = (0..self.triangles.len()).filter(|&t| is_its(t)).collect();

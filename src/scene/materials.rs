@@ -41,12 +41,10 @@ impl Model {
         if !called.is_empty() {
             return Ok(called);
         }
-        let &[place] = &self.nodes.called(name)[..] else {
-            let mut known: Vec<&str> = self.surfaces.iter().map(|s| s.name.as_str()).collect();
-            known.extend(self.nodes.names_with_surface());
-            let allowed = format!("the name of a material, or of one node: {}", known.join(", "));
-            return Err(Error::input(job, format!("{at}.name"), name, allowed));
-        };
+        let mut known: Vec<&str> = self.surfaces.iter().map(|s| s.name.as_str()).collect();
+        known.extend(self.nodes.names_with_surface());
+        let place = self.nodes.only(name, ("a material of the scene, or a node with a surface", &known));
+        let place = place.map_err(|allowed| Error::input(job, format!("{at}.name"), name, allowed))?;
         let below = self.nodes.at_or_below(place);
         let of_triangles = self.surface_of.iter_mut().zip(&self.nodes.of_triangle);
         let of_objects = self.replacements.iter_mut().filter_map(|r| Some((&mut r.surface, r.node.as_ref()?)));
@@ -84,7 +82,7 @@ fn law((job, at): (&str, &str), material: &job::Material, table: Option<&Tabulat
             let pane = match transmittance {
                 Some(share) => Pane::of_transmittance(*ior, colour(share)).ok_or_else(|| {
                     let allowed = format!("at most {:.6}, that of clear glass of ior {ior}", Pane::clearest(*ior));
-                    Error::input(job, format!("{at}.transmittance"), format!("{:?}", share.channels()), allowed)
+                    Error::input(job, format!("{at}.transmittance"), share, allowed)
                 })?,
                 None => Pane::new(*ior, Colour::WHITE),
             };

@@ -3,6 +3,7 @@
 //! A part of a scene is known to its user by the name of a node; it is everything that hangs at that node or below.
 //! Four bytes a triangle and the names are all that is kept of the hierarchy once transforms are baked in.
 
+use crate::error::listed;
 use crate::math::DMat4;
 
 /// A node of the scene.
@@ -34,6 +35,23 @@ impl Nodes {
     pub fn called(&self, name: &str) -> Vec<usize> {
         let called = |node: &Node| node.name.as_deref() == Some(name);
         (0..self.list.len()).filter(|&place| called(&self.list[place])).collect()
+    }
+
+    /// The place of the one node called `name`; else what is allowed: `what`, and names that are known.
+    pub fn only(&self, name: &str, (what, known): (&str, &[&str])) -> Result<usize, String> {
+        match self.called(name)[..] {
+            [place] => Ok(place),
+            [first, second, ..] => {
+                let [a, b] = [first, second].map(|place| self.list[place].index);
+                Err(format!("the name of one node: nodes[{a}] and nodes[{b}] of the scene both have it"))
+            }
+            [] => Err(format!("{what}: {}", listed(name, known.iter().copied()))),
+        }
+    }
+
+    /// The place of the one node called `name`, which shall show something; else what is allowed.
+    pub fn only_with_surface(&self, name: &str) -> Result<usize, String> {
+        self.only(name, ("a node of the scene with a surface", &self.names_with_surface()))
     }
 
     /// The node of the surface `primitive`; `None` for what comes from no scene file.

@@ -15,11 +15,7 @@ impl Model {
     /// [`Error::Input`] where there is not one such node with a mesh of one material, or its transform flattens.
     pub fn replace(&mut self, (job, at): (&str, &str), node: &str, file: File) -> Result<()> {
         let bad = |value: &str, allowed: String| Error::input(job, format!("{at}.node"), value, allowed);
-        let places = self.nodes.called(node);
-        let &[place] = &places[..] else {
-            let names = self.nodes.names_with_surface().join(", ");
-            return Err(bad(node, format!("the name of one node, not of {}: {names}", places.len())));
-        };
+        let place = self.nodes.only_with_surface(node).map_err(|allowed| bad(node, allowed))?;
         let is_its = |t: &usize| self.nodes.of_triangle[*t] as usize == place;
         let mut surfaces: Vec<u32> = (0..self.triangles.len()).filter(is_its).map(|t| self.surface_of[t]).collect();
         surfaces.dedup();

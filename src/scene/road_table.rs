@@ -24,21 +24,20 @@ const MOST: usize = 200;
 /// # Errors
 /// [`Error::Input`] naming the line, for whatever is not of this form.
 pub fn law_of_road(name: &str, text: &str) -> Result<String> {
-    let bad = |line: usize, value: &str, allowed: &str| {
-        Error::input(name, format!("line {line}"), value.chars().take(60).collect::<String>(), allowed)
-    };
+    let bad = |line: usize, value: &str, allowed: &str| Error::input(name, format!("line {line}"), value, allowed);
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let lines = text.lines().enumerate().map(|(i, line)| (i + 1, line.split('#').next().unwrap_or("").trim()));
     let mut lines = lines.filter(|(_, line)| !line.is_empty());
     let number = |line: usize, word: &str| {
         let parsed = word.parse::<f64>().ok().filter(|x| (0.0..=1e6).contains(x));
-        parsed.ok_or_else(|| bad(line, word, "numbers of 0 .. 1e6, or a dash"))
+        parsed.ok_or_else(|| bad(line, word, "numbers of 0 .. 1e6, with a decimal point, or a dash"))
     };
     let (at, first) = lines.next().ok_or_else(|| bad(1, "(empty)", "a line of beta"))?;
     let words = first.strip_prefix("beta").ok_or_else(|| bad(at, first, "the word beta and angles in degrees"))?;
     let betas: Vec<f64> = words.split_whitespace().map(|w| number(at, w)).collect::<Result<_>>()?;
     let ascend = betas.windows(2).all(|w| w[0] < w[1]) && betas.len() <= MOST;
     if !ascend || betas.first() != Some(&0.0) || betas.last() != Some(&180.0) {
-        return Err(bad(at, words, "ascending angles from 0 to 180"));
+        return Err(bad(at, first, "beta and ascending angles from 0 to 180"));
     }
     let (mut gammas, mut rows) = (Vec::<f64>::new(), Vec::new());
     for (at, line) in lines {

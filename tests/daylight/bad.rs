@@ -22,8 +22,8 @@ fn refused(text: &str, words: &[&str]) {
 fn skies_out_of_range_are_refused_by_field_value_and_what_is_allowed() {
     let sky = |rest: &str| format!("[sky]\nmodel = \"overcast\"\nzenith_luminance = 1000\n{rest}");
     assert!(parsed(&sky("")).is_ok());
-    refused("[sky]\nmodel = 1\n", &["sky", "0 of them", "either zenith_luminance or horizontal_illuminance"]);
-    refused(&sky("horizontal_illuminance = 1\n"), &["sky", "2 of them"]);
+    refused("[sky]\nmodel = 1\n", &["sky", "(neither)", "either zenith_luminance or horizontal_illuminance"]);
+    refused(&sky("horizontal_illuminance = 1\n"), &["sky", "(both)"]);
     refused("[sky]\nmodel = 16\nzenith_luminance = 1\n", &["sky.model", "16", "1 .. 15"]);
     refused("[sky]\nmodel = 12\nzenith_luminance = 1\n", &["sky.sun", "missing"]);
     refused("[sky]\nmodel = \"clear\"\nzenith_luminance = 1\n", &["sky.model"]);
@@ -70,7 +70,7 @@ fn area_sources_out_of_range_are_refused() {
     let rest = "direction = [0, 1, 0]\nalong = [1, 0, 0]\nsize = [1, 1]\n";
     assert!(parsed(&source("rectangle", &format!("{rest}flux = 1\n"))).is_ok());
     refused(&source("rectangle", rest), &["source[0]", "either luminance or flux"]);
-    refused(&source("rectangle", &format!("{rest}flux = 1\nluminance = 1\n")), &["source[0]", "2 of them"]);
+    refused(&source("rectangle", &format!("{rest}flux = 1\nluminance = 1\n")), &["source[0]", "(both)"]);
     refused(&source("rectangle", &format!("{rest}flux = -1\n")), &["source[0].flux", "-1"]);
     refused(&source("rectangle", &format!("{rest}flux = 1\n").replace("[1, 0, 0]", "[0, 3, 0]")), &["source[0].along"]);
     refused(&source("disc", "direction = [0, 1, 0]\nradius = 0\nflux = 1\n"), &["source[0].radius", "1e-6 .. 1e6 m"]);

@@ -32,11 +32,11 @@ fn what_is_wrong_in_lm_63_is_named() {
         (head, "1 -1 1 13 13 1 2 0 0", "vertical angles"),
         (head, "1 -1 1 13 12 1 2 0 0 0", "candela values (line 20) = 14 more numbers"),
         ("1 1 20", "0 1 20", "ballast factor (line 6) = 0: above 0"),
-        ("1 1 20", "1 1 -20", "input watts (line 6) = -20: 0 .. 1000000000 W"),
+        ("1 1 20", "1 1 -20", "input watts (line 6) = -20: 0 .. 1e9 W"),
         ("0 15 30", "0 15 15", "vertical angles (line 7) = 15 after 15"),
         ("0 15 30", "-5 15 30", "vertical angles (line 7) = -5: 0 .. 180 degrees"),
         ("0 30 60", "5 30 60", "planes (line 8) = 5 .. 360 degrees"),
-        ("320 324.619", "-320 324.619", "candela values (line 9) = -320: 0 .. 1000000000000"),
+        ("320 324.619", "-320 324.619", "candela values (line 9) = -320: 0 .. 1e12 cd"),
         ("320 324.619", "inf 324.619", "candela values (line 9) = inf"),
         ("320 324.619", "1e13 324.619", "candela values (line 9) = 1e13"),
         ("320 324.619", "320 324.619 7", "1 more numbers"),
@@ -83,9 +83,54 @@ fn what_is_wrong_in_eulumdat_is_named() {
         assert!(message.contains(expected), "line {n} = {to}: {message}");
     }
     let empty = Photometry::parse("empty.ldt", b"").unwrap_err().to_string();
-    assert!(empty.contains("sets of lamps (line 1) = the end of the file"), "{empty}");
+    assert!(
+        empty.contains("file (line 1) = empty: IES LM-63, in which a line begins with TILT=, or EULUMDAT"),
+        "{empty}"
+    );
     let binary = Photometry::parse("picture.ies", b"\x89PNG\0\0").unwrap_err().to_string();
     assert!(binary.contains("text"), "{binary}");
+}
+
+#[test]
+fn what_is_no_photometric_file_at_all_is_said_so() {
+    let full = String::from_utf8(bytes("full.ies")).unwrap();
+    for (content, begins) in [
+        (&b"\n\n"[..], "(line 1) = empty"),
+        (b"hello\nworld", "(line 1) = hello"),
+        (b"\n<!DOCTYPE html>\n<html>404</html>", "(line 2) = <!DOCTYPE html>"),
+        (b"{ \"asset\": {} }", "(line 1) = { \"asset\""),
+        (full.replace("TILT=NONE\n", "").as_bytes(), "(line 1) = IESNA:LM-63-2002"),
+    ] {
+        let said = Photometry::parse("x.ies", content).unwrap_err().to_string();
+        let wanted = format!("x.ies: file {begins}");
+        assert!(said.starts_with(&wanted) && said.contains("IES LM-63, in which a line begins with TILT="), "{said}");
+    }
+    let utf_16: Vec<u8> = full.encode_utf16().flat_map(u16::to_le_bytes).collect();
+    let said = Photometry::parse("x.ies", &utf_16).unwrap_err().to_string();
+    assert!(said.contains("bytes of value 0: text in UTF-8 or Latin-1"), "{said}");
+}
+
+#[test]
+fn what_is_odd_is_a_warning() {
+    let full = String::from_utf8(bytes("full.ies")).unwrap();
+    let warnings = |text: &str| Photometry::parse("x.ies", text.as_bytes()).unwrap().warnings;
+    for (from, to, expected) in [
+        ("IESNA:LM-63-2002", "\nIESNA:LM-63-2002", ""),
+        ("\n", "\r\r\n", ""),
+        ("IESNA:LM-63-2002\n", "", "its first line names no edition"),
+        ("LM-63-2002", "LM-63-2050", "the edition `IESNA:LM-63-2050` is not known"),
+        ("13 13 1 2 0 0 0", "13 13 1 2 600 600 0", "its luminous opening is 600 m long"),
+        ("13 13 1 2 0 0 0", "13 13 1 2 0.0006 0.0006 0", "its luminous opening is 0.0006 m long"),
+    ] {
+        assert!(full.contains(from), "{from}");
+        let found = warnings(&full.replace(from, to));
+        assert!(
+            found.len() == usize::from(!expected.is_empty()) && found.concat().contains(expected),
+            "{to}: {found:?}"
+        );
+    }
+    // The first edition had neither such a line nor keywords.
+    assert_eq!(warnings(&String::from_utf8(bytes("edition_1986.ies")).unwrap()), [""; 0]);
 }
 
 #[test]

@@ -119,7 +119,7 @@ fn meshes_that_cannot_shine_are_refused_by_name() {
     let cube = || with_mesh(&CORNERS, &CUBE);
     let both = [0, 1, 2, 0, 2, 1];
     for (more, glb, expected) in [
-        ("mesh = \"lantern\"", cube(), "luminaire[0].mesh = lantern: the name of one node, not of 0: far, lamp"),
+        ("mesh = \"lantern\"", cube(), "luminaire[0].mesh = lantern: a node of the scene with a surface: far, lamp"),
         ("mesh = \"bare\"", cube(), "luminaire[0].mesh = bare: a node with a mesh of 1 .. 4096 triangles, not of 0"),
         (
             "mesh = \"lamp\"",

@@ -216,7 +216,7 @@ fn a_luminaire_hangs_at_a_node_in_its_coordinates() {
     assert_near(lux_across(&scene, [1.0, 4.0, 2.0], lamp), WEDGE / 8.0, 1e-6);
     assert_eq!(lux_across(&scene, [1.0, 0.0, 2.0], lamp), 0.0);
     for (more, expected) in [
-        ("node = \"lantern\"", "luminaire[0].node = lantern: the name of one node of the scene, not of 0"),
+        ("node = \"lantern\"", "luminaire[0].node = lantern: a node of the scene: lamp"),
         ("node = \"lamp\"\naim = [1.0, 0.0, 0.0]\nc0 = [2.0, 0.0, 0.0]", "luminaire[0].c0"),
     ] {
         let job = format!("scene = \"s.glb\"\n{}", luminaire("wedge.ies", more));
@@ -263,6 +263,17 @@ fn ext_lights_ies_shines_along_minus_z_with_c0_along_x() {
 fn source_is_kept(names: &[&str], builder: &Builder) -> bool {
     let beside = builder.json["extensions"]["EXT_lights_ies"]["lights"][0]["uri"] == json!("wedge.ies");
     if beside { names == ["s.glb", "wedge.ies"] } else { names == ["s.glb"] }
+}
+
+#[test]
+fn what_hangs_as_if_lengths_were_millimetres_is_mentioned() {
+    let glb = gltf_scene(None, json!({ "mesh": 0, "scale": [3e3, 3e3, 3e3], "translation": [0.0, -50.0, 0.0] })).glb();
+    for (height, expected) in [("2.8", None), ("2800.0", Some("luminaire[0].position lies 2849 m from the middle"))] {
+        let hung = luminaire("wedge.ies", &format!("position = [0.0, {height}, 0.0]"));
+        let (_, plan) = planned(&format!("scene = \"s.glb\"\n{hung}"), &[("s.glb", glb.clone())]).unwrap();
+        let said = plan.scene.warnings.iter().find(|warning| warning.contains("are lengths in metres?"));
+        assert_eq!(said.map(|said| said.contains(expected.unwrap_or("nothing"))), expected.map(|_| true), "{said:?}");
+    }
 }
 
 #[test]
@@ -460,11 +471,11 @@ fn the_command_says_what_a_file_holds_and_draws_it() {
         "7, 90 .. 270 degrees",
         "2513.27 lm, 64.91 %",
         "20 W, 125.7 lm/W",
-        "curves in ./half_90_270.png",
+        "curves in half_90_270.ies.png",
     ] {
         assert!(text.contains(line), "{line}:\n{text}");
     }
-    let picture = fs::read(at.path().join("half_90_270.png")).unwrap();
+    let picture = fs::read(at.path().join("half_90_270.ies.png")).unwrap();
     let reader = png::Decoder::new(std::io::Cursor::new(picture)).read_info().unwrap();
     assert_eq!((reader.info().width, reader.info().height), (680, 760));
     let odd = String::from_utf8(lampyris(&at, &["luminaire", "wrong_ratio.ldt", "-o", "x.png"]).stdout).unwrap();
@@ -472,9 +483,16 @@ fn the_command_says_what_a_file_holds_and_draws_it() {
         odd.contains("warning") && odd.contains("the file states 8000.0 lm") && at.path().join("x.png").exists(),
         "{odd}"
     );
-    for (file, expected) in [("bad.ies", "candela multiplier (line 2)"), ("none.ies", "an IES or EULUMDAT file")] {
-        let out = lampyris(&at, &["luminaire", file]);
+    for (args, expected) in [
+        (&["bad.ies"][..], "bad.ies: candela multiplier (line 2)"),
+        (&["none.ies"], "an IES or EULUMDAT file"),
+        (&["latin_1.ies", "-o", "latin_1.ies"], "--output = latin_1.ies: a file name that ends in .png"),
+        (&["latin_1.ies", "-o", "no/x.png"], "--output = no/x.png: a file in a folder that is there"),
+        (&["latin_1.ies", "-o", ".."], "--output = ..: a file name"),
+    ] {
+        let out = lampyris(&at, &[&["luminaire"], args].concat());
         let error = String::from_utf8(out.stderr).unwrap();
         assert!(out.status.code() == Some(2) && error.contains(expected), "{error}");
     }
+    assert_eq!(fs::read(at.path().join("latin_1.ies")).unwrap(), bytes("latin_1.ies"), "the input is kept");
 }

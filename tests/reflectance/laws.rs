@@ -148,8 +148,10 @@ fn tables_that_cannot_be_are_refused() {
     refused(&(good.clone() + "1 2\n"), "last value");
     refused(good.trim_end().rsplit_once('\n').unwrap().0, "end of the file");
     refused(&table(0.3, 0.9), "no law reflects more");
-    let lines: Vec<&str> = good.lines().collect();
-    refused(&good.replacen(lines[30], &"0.2 ".repeat(19), 1), "reciprocal");
+    let mut bent: Vec<String> = good.lines().map(str::to_owned).collect();
+    bent[6] = "0.2 ".repeat(19);
+    refused(&bent.join("\n"), "f for theta 0 and 5, phi 0 (line 7) = 0.2: within a tenth of 0.1");
+    refused(&bent.join("\n"), ", for theta 5 and 0 (line 25): a law is reciprocal");
     assert!(Tabulated::parse("good", good.as_bytes()).is_ok());
 }
 

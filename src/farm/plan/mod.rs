@@ -175,6 +175,9 @@ impl Plan {
         if !self.job.luminaires.is_empty() {
             bytes.extend(serde_json::to_vec(&self.job.luminaires).expect("plain data always has a JSON form"));
         }
+        if !self.job.materials.is_empty() {
+            bytes.extend(serde_json::to_vec(&self.job.materials).expect("plain data always has a JSON form"));
+        }
         if let Some(sky) = &self.job.sky {
             bytes.extend(serde_json::to_vec(sky).expect("plain data always has a JSON form"));
         }

@@ -136,3 +136,67 @@ fn the_digest_of_a_known_job_stays() {
     assert_eq!(NUMERICS, 5);
     assert_eq!(&plan().digest[..16], "f30618010df3631c");
 }
+
+#[test]
+fn every_table_of_a_job_is_inside_the_digest() {
+    const MORE: &str = r#"
+[[gonio]]
+name = "eye"
+position = [0.0, 1.0, 0.0]
+width = 4
+height = 2
+[[region]]
+name = "part"
+camera = "view"
+rectangle = [0, 0, 2, 2]
+[[plane]]
+point = [0.0, 0.0, 0.0]
+normal = [0.0, 1.0, 0.0]
+reflectance = 0.5
+[[sphere]]
+center = [0.0, 5.0, 0.0]
+radius = 1.0
+reflectance = 0.5
+[[replace]]
+node = "head"
+harmonic = "head.harmonic"
+[[material]]
+name = "wall"
+kind = "lambert"
+reflectance = 0.5
+[[luminaire]]
+file = "lamp.ies"
+position = [0.0, 2.0, 0.0]
+[sky]
+model = 5
+zenith_luminance = 1.0
+[[opening]]
+corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
+[stop]
+relative_half_width = 0.1
+max_batches = 99
+[[ratio]]
+name = "ratio"
+numerator = "meter"
+denominator = "desk"
+"#;
+    let text = JOB.replacen("batches = 10\n", "", 1);
+    let whole = plan_of(&format!("scene = \"room.glb\"\n{text}{MORE}")).unwrap();
+    let table = toml::Table::try_from(&whole.job).unwrap();
+    assert_eq!(table.len(), 18, "a key that this test does not know: {table}");
+    let without = |keys: &[&str]| {
+        let mut rest = table.clone();
+        keys.iter().for_each(|key| drop(rest.remove(*key)));
+        let mut job: Job = rest.try_into().unwrap();
+        // What is left out is filled in with what stood there.
+        job.run = whole.job.run.clone();
+        Plan { job, ..whole.clone() }.content_digest()
+    };
+    let outside = ["scene", "stop", "ratio"];
+    assert_eq!(without(&outside), whole.content_digest());
+    for key in
+        table.keys().filter(|key| !outside.contains(&key.as_str()) && !["run", "transport"].contains(&key.as_str()))
+    {
+        assert_ne!(without(&[key]), whole.content_digest(), "{key}");
+    }
+}

@@ -14,7 +14,7 @@ pub use sight::CentreSight;
 mod crossing;
 mod reverse;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, listed};
 use crate::geometry::Ray;
 use crate::job::{Camera, Grid, Job, Point, Sampling, SetShape};
 use crate::math::{DVec2, DVec3};
@@ -172,8 +172,8 @@ impl ReceiverSet {
         for (i, camera) in job.cameras.iter().enumerate() {
             let Some(name) = &camera.node else { continue };
             let Some(node) = scene.camera(name) else {
-                let names: Vec<_> = scene.cameras.iter().map(|c| c.name.as_str()).collect();
-                let allowed = format!("a perspective camera of the scene: {}", names.join(", "));
+                let names = listed(name, scene.cameras.iter().map(|c| c.name.as_str()));
+                let allowed = format!("a perspective camera of the scene: {names}");
                 return Err(Error::input(file, format!("camera[{i}].node"), name, allowed));
             };
             let asked = f64::from(camera.width) / f64::from(camera.height);

@@ -19,6 +19,7 @@ type Decoded<T> = Result<T, String>;
 /// The image in `bytes`, or why it cannot be had.
 pub fn decode(bytes: &[u8]) -> Decoded<Image> {
     match bytes {
+        [] => Err("it is empty".to_owned()),
         [0x89, b'P', b'N', b'G', ..] => png(bytes),
         [0xff, 0xd8, 0xff, ..] => jpeg(bytes),
         [0xab, b'K', b'T', b'X', ..] => Err(other("KTX2")),

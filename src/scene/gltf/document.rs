@@ -17,7 +17,7 @@ pub use materials::{Material, Specular};
 pub use textures::{Image, Sampler, Texture, TextureReference, TextureTransform};
 
 use super::problem::File;
-use crate::error::Result;
+use crate::error::{Result, in_words};
 
 /// The whole file.
 #[derive(Deserialize, Default)]
@@ -253,10 +253,16 @@ fn triangles() -> u64 {
 pub fn parse(file: File, json: &[u8]) -> Result<Document> {
     let mut text = serde_json::Deserializer::from_slice(json);
     let document: Document = serde_path_to_error::deserialize(&mut text).map_err(|error| {
-        let field = error.path().to_string();
+        let field = Some(error.path().to_string()).filter(|path| path != "." && path != "?");
         let message = error.into_inner().to_string();
-        let (value, allowed) = message.split_once(", ").unwrap_or((message.as_str(), "as in glTF 2.0"));
-        file.bad(field, value, allowed)
+        let (message, place) = message.rsplit_once(" at line ").map_or((message.as_str(), ""), |(m, at)| (m, at));
+        let (value, allowed) = match message.split_once(", expected ") {
+            Some((value, expected)) => (value, in_words(expected)),
+            None => (message, format!("as in glTF 2.0 (line {place})")),
+        };
+        let value =
+            ["invalid type: ", "invalid value: "].iter().find_map(|kind| value.strip_prefix(kind)).unwrap_or(value);
+        file.bad(field.as_deref().unwrap_or("JSON"), value, allowed)
     })?;
     text.end().map_err(|error| file.bad("JSON", error, "nothing after the closing brace"))?;
     let version = document.asset.version.as_deref().unwrap_or("missing");

@@ -28,8 +28,8 @@ pub fn webs(
     let profiles = document.extensions.lights_ies.as_ref().map_or(&[][..], |extension| &extension.lights);
     let (mut webs, mut bytes_of_webs) = (Vec::new(), 0);
     for (i, profile) in profiles.iter().enumerate() {
-        let label = label(file, profile, i);
-        let web = Photometry::parse(&label, &bytes(file, buffers, profile, i, fetch)?)?;
+        let label = label(profile, i);
+        let web = Photometry::parse(&format!("{}: {label}", file.0), &bytes(file, buffers, profile, i, fetch)?)?;
         web.warnings.iter().for_each(|warning| warnings.add(format!("luminaire {label}: {warning}")));
         // Many profiles may lie on the same bytes: what a file makes of them is bounded, too.
         bytes_of_webs += web.bytes();
@@ -41,12 +41,12 @@ pub fn webs(
     Ok(webs)
 }
 
-/// What to call a web in messages.
-fn label(file: File, profile: &Profile, i: usize) -> String {
+/// What to call a web of the file.
+fn label(profile: &Profile, i: usize) -> String {
     let is_data = |uri: &str| uri.get(..5).is_some_and(|scheme| scheme.eq_ignore_ascii_case("data:"));
     match &profile.uri {
         Some(uri) if !is_data(uri) => uri.clone(),
-        _ => format!("{}: {NAME}[{i}]", file.0),
+        _ => format!("{NAME}[{i}]"),
     }
 }
 

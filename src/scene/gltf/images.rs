@@ -82,20 +82,21 @@ impl<'a> Images<'a> {
             return Err(self.file.bad(path, "none", allowed));
         };
         let image = self.file.item(&self.document.images, "images", source, &path)?;
-        let name = image.name.clone().or_else(|| texture.name.clone()).unwrap_or_else(|| format!("images[{source}]"));
         if let Some(image) = self.decoded.get(&source) {
             return Ok(image.clone());
         }
         let bytes = self.bytes(source)?;
         let path = format!("images[{source}]");
-        let image =
-            decode(&bytes).map_err(|reason| self.file.bad(&path, &name, format!("a PNG or JPEG image ({reason})")))?;
-        self.bytes += image.bytes();
+        let decoded = decode(&bytes).map_err(|reason| {
+            let called = [&image.name, &image.uri, &texture.name].into_iter().find_map(Option::as_deref);
+            self.file.bad(&path, called.unwrap_or("no name"), format!("a PNG or JPEG image ({reason})"))
+        })?;
+        self.bytes += decoded.bytes();
         if self.bytes > MOST_BYTES {
             let allowed = format!("at most {MOST_BYTES} bytes in all images");
             return Err(self.file.bad(path, format_args!("{} bytes of texels", self.bytes), allowed));
         }
-        let image = Arc::new(image);
+        let image = Arc::new(decoded);
         self.decoded.insert(source, image.clone());
         Ok(image)
     }

@@ -113,7 +113,17 @@ fn place(
 /// Splits a GLB; a .gltf is its JSON.
 fn container<'a>(file: File, bytes: &'a [u8]) -> Result<Container<'a>> {
     if !bytes.starts_with(b"glTF") {
-        return Ok((Cow::Borrowed(bytes), None));
+        let json = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
+        let first = json.iter().find(|byte| !byte.is_ascii_whitespace());
+        let begins = match first {
+            Some(b'{') => return Ok((Cow::Borrowed(json), None)),
+            Some(_) => format!("begins with \"{}\"", bytes[..bytes.len().min(8)].escape_ascii()),
+            None => "empty".to_owned(),
+        };
+        return Err(file.bad("content", begins, "a .glb, which begins with glTF, or a .gltf, which is JSON: {...}"));
+    }
+    if bytes.len() < 20 {
+        return Err(file.bad("content", format!("{} bytes", bytes.len()), "20 or more (is the file cut off?)"));
     }
     // The crate subtracts the size of the header from this length without looking.
     let length = bytes.get(8..12).and_then(|field| field.try_into().ok()).map_or(0, u32::from_le_bytes);

@@ -5,9 +5,6 @@ use std::fmt::Display;
 
 use crate::error::{Error, Result};
 
-/// Longest value repeated in a message \[characters\]: a data URI may hold the whole scene.
-const VALUE_LENGTH: usize = 80;
-
 /// The name of the scene file, for errors.
 #[derive(Clone, Copy)]
 pub struct File<'a>(pub &'a str);
@@ -15,7 +12,7 @@ pub struct File<'a>(pub &'a str);
 impl File<'_> {
     /// The error that `field` holds `value` where only `allowed` is accepted.
     pub fn bad(self, field: impl Display, value: impl Display, allowed: impl Display) -> Error {
-        Error::input(self.0, field, short(&value.to_string()), allowed)
+        Error::input(self.0, field, value, allowed)
     }
 
     /// Item `index` of `list`, which is called `name`; `field` is where the index stands.
@@ -48,20 +45,6 @@ impl File<'_> {
         }
         Ok(values)
     }
-}
-
-/// `text` cut to what fits in a message, control characters made visible.
-fn short(text: &str) -> String {
-    let mut cut: String = text.chars().take(VALUE_LENGTH).flat_map(visible).collect();
-    if text.chars().nth(VALUE_LENGTH).is_some() {
-        cut.push_str("...");
-    }
-    cut
-}
-
-/// The character, or its escape where a terminal would obey it.
-fn visible(c: char) -> Vec<char> {
-    if c.is_control() { c.escape_default().collect() } else { vec![c] }
 }
 
 /// What was ignored or replaced; each message once, in order of appearance.

@@ -21,7 +21,7 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
 pub fn resolve(file: File, field: &str, uri: &str, fetch: &mut dyn FnMut(&str) -> Result<Vec<u8>>) -> Result<Vec<u8>> {
     match uri.get(..5).filter(|scheme| scheme.eq_ignore_ascii_case("data:")) {
         Some(_) => data(file, field, uri),
-        None => fetch(&beside(file, field, uri)?),
+        None => fetch(&beside(file, field, uri)?).map_err(|error| error.in_field(field)),
     }
 }
 

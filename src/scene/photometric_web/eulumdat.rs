@@ -37,6 +37,11 @@ struct Lamps {
     watts: f64,
 }
 
+/// True where some of the numbers that come first are in their places.
+pub(super) fn is_like(lines: &[String]) -> bool {
+    lines.iter().take(7).skip(2).any(|line| number(line, true).is_some())
+}
+
 /// Reads `lines`.
 pub(super) fn parse(name: Named, lines: &[String]) -> Result<Photometry> {
     let sheet = Sheet { name, lines };

@@ -63,7 +63,7 @@ fn body(name: Named, lines: &[String], tilt_line: usize, comma: bool) -> Result<
             ));
         }
     };
-    let edition = edition(&lines[..tilt_line]);
+    let (edition, odd) = edition(&lines[..tilt_line]);
     let head = Head::read(&mut numbers, edition)?;
     let (measured, line) = head.table(name, &mut numbers)?;
     let (web, symmetry) = woven(name, line, &measured)?;
@@ -79,7 +79,7 @@ fn body(name: Named, lines: &[String], tilt_line: usize, comma: bool) -> Result<
         watts: head.watts,
         opening: head.opening,
         tilt,
-        warnings: Vec::new(),
+        warnings: odd.into_iter().collect(),
     };
     photometry.compare();
     Ok(photometry)
@@ -161,13 +161,26 @@ impl Edition {
     }
 }
 
-/// The edition that the first line names; the first edition has no such line.
-fn edition(head: &[String]) -> Edition {
-    let first = head.first().map(|line| line.to_ascii_uppercase()).unwrap_or_default();
-    let Some(rest) = first.strip_prefix("IES") else { return Edition::Of1986 };
-    let ends = [("2019", Edition::Of2019), ("02", Edition::Of2002), ("95", Edition::Of1995), ("86", Edition::Of1986)];
-    let found = ends.iter().find(|(end, _)| rest.trim_end().ends_with(end));
-    found.map_or(if rest.ends_with("-19") { Edition::Of2019 } else { Edition::Of1991 }, |(_, edition)| *edition)
+/// The edition that the first line names, and what is odd about it. The first edition has no such line, and no keywords.
+fn edition(head: &[String]) -> (Edition, Option<String>) {
+    let first = head.iter().find(|line| !line.is_empty()).map_or("", String::as_str);
+    let Some(rest) = first.to_ascii_uppercase().strip_prefix("IES").map(str::to_owned) else {
+        let odd = head.iter().any(|line| line.starts_with('['));
+        let warning = "its first line names no edition (IESNA:LM-63-...): it is read as LM-63-1986";
+        return (Edition::Of1986, odd.then(|| warning.to_owned()));
+    };
+    let ends = [
+        ("2019", Edition::Of2019),
+        ("-19", Edition::Of2019),
+        ("02", Edition::Of2002),
+        ("95", Edition::Of1995),
+        ("91", Edition::Of1991),
+        ("86", Edition::Of1986),
+    ];
+    match ends.iter().find(|(end, _)| rest.ends_with(end)) {
+        Some((_, edition)) => (*edition, None),
+        None => (Edition::Of1991, Some(format!("the edition `{first}` is not known: it is read as LM-63-1991"))),
+    }
 }
 
 /// The keywords with their values; `[MORE]` goes on with the one before. Lines of the first edition have none.

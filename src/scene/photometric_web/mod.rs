@@ -36,6 +36,9 @@ use text::Named;
 const MOST_CANDELA: f64 = 1e12;
 /// Most intensities of a file: half a degree by half a degree, all around, are 261 000.
 const MOST_VALUES: usize = 1 << 22;
+/// Lengths beyond which an opening is mentioned \[m\].
+const SHORTEST: f64 = 1e-3;
+const LONGEST: f64 = 20.0;
 /// From this share on a disagreement of two fluxes is reported.
 const DISAGREEMENT: f64 = 0.02;
 
@@ -79,7 +82,8 @@ pub struct Photometry {
 }
 
 impl Photometry {
-    /// Reads the file called `name` with the content `bytes`: LM-63 where a line begins with `TILT=`, else EULUMDAT.
+    /// Reads the file called `name` with the content `bytes`: LM-63 where a line begins with `TILT=`, else EULUMDAT where there are
+    /// numbers in its places.
     ///
     /// # Errors
     /// [`Error::Input`](crate::error::Error::Input) with field, line, value and what is allowed.
@@ -87,7 +91,13 @@ impl Photometry {
         let lines = text::lines(Named(name), bytes)?;
         match lines.iter().position(|line| lm63::is_tilt(line)) {
             Some(tilt) => lm63::parse(Named(name), &lines, tilt),
-            None => eulumdat::parse(Named(name), &lines),
+            None if eulumdat::is_like(&lines) => eulumdat::parse(Named(name), &lines),
+            None => {
+                let (line, first) = (1..).zip(&lines).find(|(_, line)| !line.is_empty()).unwrap_or((1, &lines[0]));
+                let begins = if first.is_empty() { "empty" } else { first };
+                let allowed = "IES LM-63, in which a line begins with TILT=, or EULUMDAT, with numbers on lines 3 to 7";
+                Err(Named(name).bad(line, "file", begins, allowed))
+            }
         }
     }
 
@@ -111,8 +121,13 @@ impl Photometry {
         self.lamps.map(|(_, lamps)| self.flux() / lamps)
     }
 
-    /// Notes where the flux of the web is not what the file says of it.
+    /// Notes where the flux of the web is not what the file says of it, and an opening that no luminaire has.
     fn compare(&mut self) {
+        let Opening { width, length, height, .. } = self.opening;
+        let longest = width.max(length).max(height);
+        if longest > 0.0 && !(SHORTEST..=LONGEST).contains(&longest) {
+            self.warnings.push(format!("its luminous opening is {longest} m long: are its numbers in another unit?"));
+        }
         let flux = self.flux();
         if let Some(stated) = self.stated_flux.filter(|s| (flux / s - 1.0).abs() > DISAGREEMENT) {
             let percent = 100.0 * (flux / stated - 1.0);

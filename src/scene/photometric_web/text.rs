@@ -4,8 +4,6 @@ use crate::error::{Error, Result};
 
 /// Longest file \[bytes\]: a web of a thousand by a thousand directions is shorter.
 const LONGEST: usize = 1 << 24;
-/// Longest value repeated in a message \[characters\].
-const SHOWN: usize = 60;
 
 /// A file of text under the name by which it is called in errors.
 #[derive(Clone, Copy)]
@@ -14,7 +12,6 @@ pub struct Named<'a>(pub &'a str);
 impl Named<'_> {
     /// The error that `field` on line `line`, counted from 1, holds `value` where only `allowed` is accepted.
     pub fn bad(self, line: usize, field: &str, value: impl ToString, allowed: impl ToString) -> Error {
-        let value: String = value.to_string().chars().take(SHOWN).flat_map(char::escape_default).collect();
         Error::input(self.0, format!("{field} (line {line})"), value, allowed)
     }
 }
@@ -31,12 +28,14 @@ pub fn lines(name: Named, bytes: &[u8]) -> Result<Vec<String>> {
     let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
     let bytes = bytes.split(|&b| b == 0x1A).next().unwrap_or_default();
     if bytes.contains(&0) {
-        return Err(name.bad(1, "file", "bytes of value 0", "text"));
+        return Err(name.bad(1, "file", "bytes of value 0", "text in UTF-8 or Latin-1"));
     }
     let text = match std::str::from_utf8(bytes) {
         Ok(text) => text.to_owned(),
         Err(_) => bytes.iter().map(|&b| char::from(b)).collect(),
     };
+    // Sent as text by a program that thought it was not, a line ends twice.
+    let text = text.replace("\r\r\n", "\n");
     Ok(text.replace("\r\n", "\n").replace('\r', "\n").split('\n').map(|line| line.trim().to_owned()).collect())
 }
 
@@ -84,8 +83,10 @@ impl<'a> Wanted<'a> {
         let Wanted { low, high, unit, .. } = self;
         let text = if self.above {
             format!("above {low}, at most {high:e} {unit}")
+        } else if self.high == f64::MAX {
+            "a number".to_owned()
         } else {
-            format!("{low} .. {high} {unit}")
+            format!("{low} .. {} {unit}", if *high < 1e7 { high.to_string() } else { format!("{high:e}") })
         };
         text.trim_end().to_owned()
     }
