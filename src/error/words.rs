@@ -1,7 +1,7 @@
 //! Values, names and types as messages show them.
 
 /// Longest value repeated in a message \[characters\]: a data URI may hold a whole scene.
-const LONGEST: usize = 120;
+const LONGEST: usize = 400;
 /// Digits beyond which a number is shown with a power of ten; every f64 of ordinary size and every u64 has fewer.
 const DIGITS: usize = 24;
 /// Most names that a message lists.
@@ -84,7 +84,7 @@ mod tests {
             (0.1f64.to_string(), "0.1".to_owned()),
             ("a\u{1b}[2J\nb".to_owned(), "a\\u{1b}[2J\\nb".to_owned()),
             ("Stra\u{df}e".to_owned(), "Stra\u{df}e".to_owned()),
-            ("x".repeat(500), "x".repeat(LONGEST) + "..."),
+            ("x".repeat(900), "x".repeat(LONGEST) + "..."),
         ];
         for (value, expected) in cases {
             assert_eq!(shown(&value), expected);
