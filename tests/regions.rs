@@ -117,7 +117,8 @@ fn a_node_behind_a_pane_is_seen_and_so_is_the_pane() {
     }
     b.json["scenes"] = json!([{ "nodes": [0, 8, 9] }]);
     let same = [("Table", "rectangle = [2, 2, 3, 4]"), ("Pane", "rectangle = [0, 0, 8, 8]")];
-    let regions: String = same.iter().map(|(node, what)| by_node(node) + &region(&format!("of_{node}"), what)).collect();
+    let regions: String =
+        same.iter().map(|(node, what)| by_node(node) + &region(&format!("of_{node}"), what)).collect();
     let case = Case::new(&format!("{VIEW}{regions}"), model(&b));
     for batch in &case.batches(1..u32::MAX).1 {
         assert_eq!((value(batch, 1), value(batch, 3)), (value(batch, 2), value(batch, 4)));

@@ -6,7 +6,9 @@ use super::replicate::Kind;
 use lampyris::error::Result;
 use lampyris::math::{DVec2, DVec3};
 use lampyris::photometry::Colour;
-use lampyris::scene::textures::{Charts, Coding, Coverage, Filter, Image, Layer, Texels, Textured, Textures, Transform, Wrap};
+use lampyris::scene::textures::{
+    Charts, Coding, Coverage, Filter, Image, Layer, Texels, Textured, Textures, Transform, Wrap,
+};
 use lampyris::scene::{Delta, Dielectric, Glass, Model, Pane, Reflectance, Surface, Tabulated};
 use lampyris::validate::experiment::Experiment;
 use lampyris::validate::scenes::{UP, add_quad, box_walls, closed_box, lambert, point};

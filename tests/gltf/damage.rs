@@ -121,7 +121,18 @@ fn materials_and_textures_with_odd_values_never_panic() {
     let job = Job::parse(job, "job.toml").unwrap();
     let whole = furnished();
     Scene::new(load(&whole.glb()).expect("unchanged it is good"), &job).expect("unchanged it is a scene");
-    let odd = [json!(null), json!(-1), json!(0), json!(1), json!(0.37), json!(7), json!(1e300), json!("x"), json!([]), json!(4294967296u64)];
+    let odd = [
+        json!(null),
+        json!(-1),
+        json!(0),
+        json!(1),
+        json!(0.37),
+        json!(7),
+        json!(1e300),
+        json!("x"),
+        json!([]),
+        json!(4294967296u64),
+    ];
     let mut rng = Pcg64::new(3, 1);
     let (mut accepted, times) = (0, 1500);
     for _ in 0..times {

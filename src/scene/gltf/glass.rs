@@ -48,7 +48,8 @@ pub(super) fn glass(
     }
     let Some(volume) = extensions.volume.as_ref().filter(|volume| volume.thickness_factor > 0.0) else {
         if material.pbr_metallic_roughness.base_color_texture.is_some() {
-            warnings.add(format!("material `{name}`: baseColorTexture counts by its mean: a pane is the same all over"));
+            warnings
+                .add(format!("material `{name}`: baseColorTexture counts by its mean: a pane is the same all over"));
         }
         return Ok(Some(Reflectance::Delta(Delta::Pane(Pane::new(index, base)))));
     };
