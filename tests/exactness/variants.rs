@@ -55,7 +55,7 @@ const VARIANTS: [Variant; 8] = [
     ("open-random-rgb", &[OF_OPEN, RANDOM, RGB]),
     ("plain", &[PLAIN]),
     ("reverse-rgb", &[REVERSE, RGB]),
-    ("peaked", &[("room.glb", "peaked.glb"), OF_SURFACES, RGB]),
+    ("surfaces", &[("room.glb", "peaked.glb"), OF_SURFACES, RGB]),
     ("sky", &[OF_SKY]),
 ];
 
