@@ -124,7 +124,7 @@ fn local_and_reverse_agree_on_walls_of_every_kind_around_a_ball_of_glass() {
         );
         Case::new(&(run + &receivers), room())
     };
-    let (local, reverse) = (case("local", 128, 704), case("reverse", 1792, 128));
+    let (local, reverse) = (case("local", 128, 704), case("reverse", 2048, 128));
     let names = local.job.sets().into_iter().map(|s| s.name);
     let pairs = names.zip(local.values().into_iter().zip(reverse.values()));
     assert_all(&pairs.map(|(name, (a, b))| difference(name, a, b)).collect::<Vec<_>>());
