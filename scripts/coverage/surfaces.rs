@@ -19,9 +19,8 @@ const MIDDLE: [f64; 3] = [0.5, 0.5, 0.5];
 
 /// All cases, printed as they come.
 pub fn run(replicates: u64, mut done: impl FnMut(&[Counted])) -> Result<Vec<Counted>> {
-    let cases: [fn(u64) -> Result<Vec<Counted>>; 8] = [globe, pane, mirror, glass, phong, tabulated, texture, veil];
     let mut all = Vec::new();
-    for case in cases {
+    for case in [globe, pane, mirror, glass, phong, tabulated, texture, veil] {
         let counted = case(replicates)?;
         done(&counted);
         all.extend(counted);
