@@ -14,6 +14,7 @@ use lampyris::math::{DVec3, PI};
 use lampyris::photometry::Colour;
 use lampyris::scene::{Model, Reflectance, Surface};
 use lampyris::tally::{BatchScores, Scores, SetTally, Tally};
+use lampyris::validate::scenes::in_parallel_light;
 
 /// The run of one estimator: `local`, whose kernel is bounded, `reverse` or `direct_simulation`.
 fn run(estimator: &str, histories: u32, batches: u32) -> String {
@@ -291,6 +292,24 @@ fn direct_simulation_counts_every_arrival_on_the_walls_of_a_closed_box_once() {
         assert!(totals.len() == 2048 && (mean / scores.value[17] - 1.0).abs() < 1e-12, "{mean}");
     }
     assert_all(&[compare("flux on the walls", counted, emitted / (1.0 - rho))]);
+}
+
+#[test]
+fn direct_simulation_counts_light_from_outside_in_cells_beyond_all_surfaces() {
+    // Beside and above a small box, in parallel light aslant and under an even sky: nothing stands in the way.
+    let corners = [DVec3::new(1.5, 1.5, 2.5), DVec3::X * 4.0, DVec3::NEG_Z * 4.0, DVec3::Y];
+    let box_at_origin = || closed_box(DVec3::ONE, &lambert(0.5, 0.0));
+    let sun = DVec3::new(0.6, -0.8, 0.0);
+    let job = run("direct_simulation", 16384, 32) + &grid("g", corners, 1, 1);
+    let sky = job.clone() + "[sky]\nmodel = \"uniform\"\nhorizontal_illuminance = 1000.0\n";
+    let mut all = Vec::new();
+    for (name, case, exact) in [
+        ("sun", Case::new(&job, in_parallel_light(box_at_origin(), sun, 1000.0)), 800.0),
+        ("sky", Case::new(&sky, box_at_origin()), 1000.0),
+    ] {
+        all.push(compare(name, case.values()[0], exact));
+    }
+    assert_all(&all);
 }
 
 #[test]

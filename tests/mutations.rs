@@ -1,4 +1,4 @@
-//! Files that are not what they should be: 13,000 checkpoints, compactions, plans and jobs, changed by a seeded mutator, are
+//! Files that are not what they should be: 17,000 checkpoints, compactions, plans, jobs and tables, changed by a seeded mutator, are
 //! read by a process that counts what it allocates. Nothing panics, nothing hangs, no memory beyond twice the file and a
 //! constant, and no number that was written is read as another.
 
@@ -9,6 +9,7 @@ use lampyris::farm::merge::compact::compact;
 use lampyris::farm::plan::{Input, Plan, SceneSummary};
 use lampyris::job::Job;
 use lampyris::random::{Domain, Generator, Stream};
+use lampyris::scene::{Tabulated, law_of_road};
 use lampyris::tally::{BatchScores, Scores, Tally};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::fs;
@@ -208,6 +209,12 @@ fn mutate(bytes: &mut Vec<u8>, other: &[u8], draws: &mut Generator) {
     }
 }
 
+/// Writes another digit somewhere: another number, which is more often another file than none.
+fn another_digit(bytes: &mut [u8], draws: &mut Generator) {
+    let digits: Vec<usize> = (0..bytes.len()).filter(|&i| bytes[i].is_ascii_digit()).collect();
+    bytes[digits[draws.below(digits.len() as u32) as usize]] = b'0' + draws.below(10) as u8;
+}
+
 /// Writes a file anew: a file that is cut and written again is flushed to the disk by some systems, which takes long.
 fn put(path: &Path, bytes: &[u8]) {
     fs::remove_file(path).unwrap();
@@ -334,9 +341,7 @@ fn two_thousand_changed_jobs_are_read_or_refused() {
         if case % 2 == 0 {
             mutate(&mut bytes, digest.as_bytes(), &mut draws);
         } else {
-            // Another number, which is more often another job than none.
-            let digits: Vec<usize> = (0..bytes.len()).filter(|&i| bytes[i].is_ascii_digit()).collect();
-            bytes[digits[draws.below(digits.len() as u32) as usize]] = b'0' + draws.below(10) as u8;
+            another_digit(&mut bytes, &mut draws);
         }
         let text = String::from_utf8_lossy(&bytes).into_owned();
         match bounded(text.len(), case, || Job::parse(&text, "job.toml")) {
@@ -346,4 +351,41 @@ fn two_thousand_changed_jobs_are_read_or_refused() {
         }
     }
     assert!(refused > 1000 && accepted > 500, "{refused} refused, {accepted} accepted");
+}
+
+#[test]
+fn four_thousand_changed_tables_are_read_or_refused() {
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut draws = Stream::new(13, Domain::Receiver, "tables").generator(0);
+    let row = "0.1 0.12 0.15 0.2\n";
+    let brdf =
+        format!("lampyris-brdf 1 # a comment\nchannels 1\ntheta 0 30 60 80\nphi 0 60 120 180\n{}", row.repeat(16));
+    let road = "beta 0 10 90 180\n0 700 700 700 700\n1 300 200 150 100\n4 90 9 - 3\n";
+    // All angles that a table may have, and not one value.
+    let angles = |end: u32| (0..256).map(|i| format!(" {}", f64::from(i * end) / 255.0)).collect::<String>();
+    let promise = format!("lampyris-brdf 1\nchannels 3\ntheta{}\nphi{}\n", angles(90), angles(180));
+    assert!(bounded(promise.len(), 0, || Tabulated::parse("promise.brdf", promise.as_bytes())).is_err());
+    let (mut accepted, mut refused) = (0, 0);
+    for case in 0..4000 {
+        let original = if case % 2 == 0 { &brdf[..] } else { road };
+        let mut bytes = original.as_bytes().to_vec();
+        if case % 4 < 2 {
+            mutate(&mut bytes, b"180 90 1e6 -1 nan 0.3 5", &mut draws);
+        } else {
+            another_digit(&mut bytes, &mut draws);
+        }
+        let text = String::from_utf8_lossy(&bytes).into_owned();
+        let read = bounded(text.len(), case, || match case % 2 {
+            0 => Tabulated::parse("law.brdf", &bytes).map(drop),
+            _ => {
+                law_of_road("road.txt", &text).and_then(|text| Tabulated::parse("law.brdf", text.as_bytes())).map(drop)
+            }
+        });
+        match read {
+            Ok(()) => accepted += 1,
+            Err(Error::Input { .. }) => refused += 1,
+            Err(e) => panic!("case {case}: {e}"),
+        }
+    }
+    assert!(refused > 1500 && accepted > 300, "{refused} refused, {accepted} accepted");
 }

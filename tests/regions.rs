@@ -98,6 +98,37 @@ fn a_node_is_the_pixels_that_show_it_or_what_hangs_below() {
 }
 
 #[test]
+fn a_node_behind_a_pane_is_seen_and_so_is_the_pane() {
+    // A pane over the whole picture, and a screen with holes over its right half.
+    let mut b = furnished();
+    let square = b.json["meshes"].as_array().unwrap().len() - 1;
+    for material in [
+        json!({ "pbrMetallicRoughness": { "metallicFactor": 0.0, "roughnessFactor": 0.0 },
+            "extensions": { "KHR_materials_transmission": { "transmissionFactor": 1.0 } } }),
+        json!({ "alphaMode": "MASK", "pbrMetallicRoughness": { "baseColorFactor": [1.0, 1.0, 1.0, 0.2] } }),
+    ] {
+        b.push("/materials", material);
+    }
+    for (material, name, [x, width, height]) in [(1, "Pane", [-2.0, 4.0, 1.0]), (2, "Holes", [0.0, 2.0, 1.1])] {
+        let mut mesh = b.json["meshes"][square].clone();
+        mesh["primitives"][0]["material"] = json!(material);
+        let mesh = b.push("/meshes", mesh);
+        b.node(json!({ "name": name, "mesh": mesh, "translation": [x, height, 2.0], "scale": [width, 1.0, 4.0] }));
+    }
+    b.json["scenes"] = json!([{ "nodes": [0, 8, 9] }]);
+    let same = [("Table", "rectangle = [2, 2, 3, 4]"), ("Pane", "rectangle = [0, 0, 8, 8]")];
+    let regions: String =
+        same.iter().map(|(node, what)| by_node(node) + &region(&format!("of_{node}"), what)).collect();
+    let case = Case::new(&format!("{VIEW}{regions}"), model(&b));
+    for batch in &case.batches(1..u32::MAX).1 {
+        assert_eq!((value(batch, 1), value(batch, 3)), (value(batch, 2), value(batch, 4)));
+    }
+    // A hole is nothing to see.
+    let said = refusal(&b, &by_node("Holes"));
+    assert!(said.contains("region[0].node = Holes"), "{said}");
+}
+
+#[test]
 fn a_region_of_the_whole_picture_is_the_mean_of_the_map() {
     let whole = region("whole", "rectangle = [0, 0, 8, 8]") + &by_node("Room");
     let case = Case::new(&format!("{VIEW}{whole}"), model(&furnished()));

@@ -4,6 +4,7 @@
 //! cargo run --release --example coverage -- edge SAMPLING KERNEL REPLICATES      lux-meters and a pixel at an edge
 //! cargo run --release --example coverage -- cases REPLICATES                     small cases of every kind
 //! cargo run --release --example coverage -- lights REPLICATES                    many lights, lights with an extent
+//! cargo run --release --example coverage -- surfaces REPLICATES                  opal, panes, mirrors, glass, tables, textures
 //! cargo run --release --example coverage -- convergence SAMPLING SEEDS           no floor beside a column
 //! ```
 //!
@@ -17,6 +18,7 @@ mod edge;
 mod lights;
 mod marks;
 mod replicate;
+mod surfaces;
 
 use count::Counted;
 use lampyris::error::{Error, Result};
@@ -32,7 +34,7 @@ fn main() {
 }
 
 fn run(words: &[&str]) -> Result<()> {
-    let allowed = "edge SAMPLING KERNEL REPLICATES, cases REPLICATES, lights REPLICATES, convergence SAMPLING SEEDS";
+    let allowed = "edge SAMPLING KERNEL REPLICATES, cases REPLICATES, lights REPLICATES, surfaces REPLICATES, convergence SAMPLING SEEDS";
     let last = words.last().and_then(|w| w.parse::<u64>().ok()).filter(|&n| n > 1);
     match (words, last) {
         (["edge", sampling, kernel @ ("bounded" | "plain"), _], Some(n)) => {
@@ -50,6 +52,11 @@ fn run(words: &[&str]) -> Result<()> {
         (["lights", _], Some(n)) => {
             println!("{}", Counted::HEAD);
             marks::print(&lights::run(n, print)?);
+            Ok(())
+        }
+        (["surfaces", _], Some(n)) => {
+            println!("{}", Counted::HEAD);
+            marks::print(&surfaces::run(n, print)?);
             Ok(())
         }
         (["convergence", sampling, _], Some(n)) => convergence::run(sampling, n),

@@ -7,7 +7,7 @@
 
 use super::local;
 use super::receivers::{CentreSight, ReceiverSet};
-use super::regions::Regions;
+use super::regions::{Regions, Seen};
 use super::thinning::Thinning;
 use crate::geometry::kd_order;
 use crate::job::{Channels, Estimator, Job, Sampling};
@@ -209,9 +209,9 @@ fn balance<T>(traced: &[Traced<T>]) -> FluxBalance {
     flux
 }
 
-/// The surface seen in the centre of each pixel.
-fn centres(sight: &CentreSight) -> Vec<Option<u32>> {
-    (0..sight.pixels()).into_par_iter().map(|pixel| sight.primitive(pixel)).collect()
+/// The surfaces seen in the centre of each pixel.
+fn centres(sight: &CentreSight) -> Seen {
+    (0..sight.pixels()).into_par_iter().map(|pixel| sight.surfaces(pixel)).collect()
 }
 
 /// The bins of `set` in the order in which they share tiles.

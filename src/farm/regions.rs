@@ -5,7 +5,7 @@
 //! ```
 //!
 //! A rectangle is given; the pixels of a node are those in whose centre the node, or one below it, is the first
-//! surface seen. They are found once, so a region is the same in every batch, and its scores are a fixed linear
+//! surface seen, or is seen straight through panes and veils. They are found once, so a region is the same in every batch, and its scores are a fixed linear
 //! combination of the map's: they carry the correlation between its pixels, which the map's own errors do not. A pixel
 //! that sees nothing counts as it does in the map, 0. Pixels are summed in their order: the same bits always.
 //!
@@ -17,6 +17,7 @@ use crate::error::{Error, Result};
 use crate::job::{Job, Region};
 use crate::scene::{Nodes, Scene};
 use crate::tally::Scores;
+use smallvec::SmallVec;
 use std::ops::Range;
 
 /// The regions of a job, in its order.
@@ -32,8 +33,8 @@ struct Part {
     count: f64,
 }
 
-/// The surface seen in the centre of each pixel of a camera.
-pub type Seen = Vec<Option<u32>>;
+/// The surfaces seen in the centre of each pixel of a camera: panes and veils, and what stands behind them.
+pub type Seen = Vec<SmallVec<[u32; 2]>>;
 
 impl Regions {
     /// The regions of `job`, read from `file`, in `scene`; `look` follows the rays of a camera through the centres of
@@ -73,7 +74,7 @@ impl Regions {
     /// # Errors
     /// [`Error::Input`] as [`Regions::place`].
     pub fn check(job: &Job, scene: &Scene, file: &str) -> Result<()> {
-        let look = |sight: &CentreSight| (0..sight.pixels()).map(|pixel| sight.primitive(pixel)).collect();
+        let look = |sight: &CentreSight| (0..sight.pixels()).map(|pixel| sight.surfaces(pixel)).collect();
         Regions::place(job, scene, file, look).map(|_| ())
     }
 
@@ -112,15 +113,16 @@ impl Part {
 }
 
 fn unseen(region: &Region) -> String {
-    format!("a node that is the first surface in the centre of at least one pixel of camera {}", region.camera)
+    let camera = &region.camera;
+    format!("a node that is the first surface in the centre of at least one pixel of camera {camera}, panes apart")
 }
 
 /// Runs of pixels in whose centre `node`, or one below it, is seen.
 fn runs_of(seen: &Seen, nodes: &Nodes, node: usize) -> Vec<Range<u32>> {
     let inside = nodes.at_or_below(node);
     let mut runs: Vec<Range<u32>> = Vec::new();
-    for (pixel, primitive) in (0u32..).zip(seen) {
-        if !primitive.and_then(|p| nodes.of(p)).is_some_and(|node| inside[node]) {
+    for (pixel, primitives) in (0u32..).zip(seen) {
+        if !primitives.iter().any(|&p| nodes.of(p).is_some_and(|node| inside[node])) {
             continue;
         }
         match runs.last_mut() {

@@ -14,7 +14,7 @@
 use super::opening::Opening;
 use super::{Emission, Light, Sky};
 use crate::geometry::Geometry;
-use crate::job;
+use crate::job::{self, Estimator, Job};
 use crate::math::{DVec2, DVec3, PI, to_world};
 use crate::photometry::Colour;
 use crate::random::{Generator, disc, evenly};
@@ -57,6 +57,19 @@ enum Source {
     Parallel(usize),
 }
 
+/// Centre and radius of the ball that light from outside must cover: all surfaces, and the cells in which direct simulation counts it \[m\].
+pub(super) fn covered(geometry: &Geometry, job: &Job, offset: DVec3) -> (DVec3, f64) {
+    let (center, mut radius) = geometry.bounding_sphere();
+    if job.transport.estimator == Estimator::DirectSimulation {
+        for grid in &job.grids {
+            let [origin, u, v] = [grid.origin, grid.u, grid.v].map(DVec3::from);
+            let corners = [origin, origin + u, origin + v, origin + u + v];
+            radius = corners.into_iter().map(|corner| (corner + offset).distance(center)).fold(radius, f64::max);
+        }
+    }
+    (center, radius)
+}
+
 /// A line on which light comes.
 struct Line {
     point: DVec3,
@@ -65,14 +78,14 @@ struct Line {
 }
 
 impl Environment {
-    /// The sky of `job` and the parallel ones of `lights`, and the openings; `None` without a sky, where there is not both of
+    /// The sky and the parallel ones of `lights`, over what is `covered`, and the openings of a job, moved by `offset`; `None` without a sky, where there is not both of
     /// the others.
     pub(super) fn new(
         sky: Option<Sky>,
         lights: &[Light],
-        openings: &[job::Opening],
-        offset: DVec3,
+        (openings, offset): (&[job::Opening], DVec3),
         geometry: &Geometry,
+        covered: (DVec3, f64),
     ) -> Option<Environment> {
         let parallel = lights.iter().filter_map(|light| match light {
             Light::Directional { direction, illuminance } => Some((*direction, *illuminance)),
@@ -89,7 +102,7 @@ impl Environment {
             openings: openings.iter().map(opening).collect(),
             parallel,
             starts: Vec::new(),
-            covered: geometry.bounding_sphere(),
+            covered,
         };
         all.starts = all.ways(geometry);
         Some(all)

@@ -8,6 +8,7 @@ mod area;
 mod beam;
 mod body;
 mod choice;
+mod closed;
 mod environment;
 pub mod gltf;
 mod groups;
@@ -106,6 +107,7 @@ impl Scene {
         let corners: Vec<_> = corners.collect();
         let mut surfaces: Vec<Surface> = model.surfaces.into_iter().map(|s| painted(s, job.run.channels)).collect();
         let mut surface_of = model.surface_of;
+        closed::refuse_open_glass(&surfaces, &surface_of, &corners, offset)?;
         let is_veil =
             |(triangle, &s): (u32, &u32)| surfaces[s as usize].is_veil() || model.textures.is_veil(s, triangle);
         let veils: Vec<bool> = (0..).zip(&surface_of).map(is_veil).collect();
@@ -132,11 +134,12 @@ impl Scene {
         let lights = model.lights.into_iter().chain(job.sources.iter().filter_map(Light::of_job)).chain(sun);
         let lights: Vec<Light> = lights.map(|l| l.moved(offset).recoloured(paint)).collect();
         refuse_endless_flux(&geometry, &lights, sky.is_some())?;
-        let environment = Environment::new(sky, &lights, &job.openings, offset, &geometry);
+        let covered = environment::covered(&geometry, job, offset);
+        let environment = Environment::new(sky, &lights, (&job.openings, offset), &geometry, covered);
         let given = lights.len();
         let panels = panels(&geometry, of_panels, model.extended, |l| l.moved(offset).recoloured(paint));
         let bodies = bodies(&geometry, &surfaces, &surface_of);
-        let mut sources = Sources::new(lights, emitters, panels, bodies, geometry.bounding_sphere());
+        let mut sources = Sources::new(lights, emitters, panels, bodies, covered);
         if let Some(environment) = environment {
             sources = sources.under(environment);
         }

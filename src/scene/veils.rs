@@ -10,6 +10,7 @@ use crate::geometry::{Hit, Ray};
 use crate::math::{DVec3, Vec3};
 use crate::photometry::Colour;
 use crate::random::Generator;
+use smallvec::SmallVec;
 
 /// Guard against rays that never end among veils.
 const MAX_VEILS: u32 = 1 << 16;
@@ -89,6 +90,26 @@ impl Scene {
             ray = self.onward(&hit, ray.direction);
         }
         (None, Colour::BLACK)
+    }
+
+    /// The surfaces seen straight along `ray`: the first that lets nothing through there, and the veils before it where they are no holes.
+    pub fn seen_along(&self, ray: &Ray) -> SmallVec<[u32; 2]> {
+        let (mut ray, mut seen) = (*ray, SmallVec::new());
+        for _ in 0..MAX_VEILS {
+            let Some(hit) = self.geometry.closest_hit(&ray) else { break };
+            let through = match self.is_veil(hit.primitive) {
+                true => self.let_through(hit.primitive, hit.position, -ray.direction.dot(hit.normal)),
+                false => Colour::BLACK,
+            };
+            if through != Colour::WHITE {
+                seen.push(hit.primitive);
+            }
+            if through.is_black() {
+                break;
+            }
+            ray = self.onward(&hit, ray.direction);
+        }
+        seen
     }
 
     /// The ray that goes on along `direction` behind the surface that it met at `hit`.

@@ -1,11 +1,12 @@
 //! Every option of a job is as exact as the defaults: estimators, ways of sampling, bounds of a closed and of an open
-//! scene, polished and peaked surfaces, channels. One small job, changed line by line.
+//! scene, surfaces of every kind, channels. One small job, changed line by line; the parts of it are run with other instructions.
 
 use crate::bits::{read_map, summary};
 use crate::faults::die_at;
 use crate::place::{Place, plan_in};
 use crate::process::{expect, lampyris, run_quietly, work};
 use lampyris::farm::durable::Step;
+use lampyris::geometry::simd;
 use lampyris::scene::gltf;
 use std::collections::BTreeMap;
 use std::fs;
@@ -24,6 +25,17 @@ const OF_SKY: (&str, &str) = (
      [[source]]\nkind = \"sphere\"\nposition = [1, 2, -1]\nradius = 0.1\nflux = 100\n[[source]]\nkind = \"disc\"\n\
      position = [2, 2, -1]\ndirection = [0, -1, 0]\nradius = 0.1\nluminance = 1000\n[[camera]]\n",
 );
+/// Laws that the room has not: matt and glossy ones, a mirror of steel and a picture with a texture are there already.
+const OF_SURFACES: (&str, &str) = (
+    "[[camera]]\n",
+    "[[material]]\nname = \"floorboards\"\nkind = \"tabulated\"\nfile = \"floor.brdf\"\n\
+     [[material]]\nname = \"accent wall\"\nkind = \"phong\"\ndiffuse = [0.3, 0.2, 0.1]\nspecular = 0.4\nexponent = 20\n\
+     [[material]]\nname = \"lampshade\"\nkind = \"opal\"\nreflectance = 0.4\ntransmittance = [0.5, 0.4, 0.3]\n\
+     [[material]]\nname = \"brushed steel\"\nkind = \"mirror\"\nreflectance = 0.8\n\
+     [[material]]\nname = \"paper green\"\nkind = \"pane\"\n\
+     [[material]]\nname = \"apple\"\nkind = \"glass\"\ntransmittance_per_metre = 0.1\n[[camera]]\n",
+);
+const FLOOR: &str = "lampyris-brdf 1\nchannels 1\ntheta 0 80\nphi 0 180\n0.1 0.1\n0.1 0.1\n0.1 0.1\n0.1 0.4\n";
 const RANDOM: (&str, &str) = ("seed = 23", "seed = 23\nsampling = \"random\"");
 const RGB: (&str, &str) = ("seed = 23", "seed = 23\nchannels = \"rgb\"");
 const OF_OPEN: (&str, &str) = ("[[camera]]\n", OPEN);
@@ -43,7 +55,7 @@ const VARIANTS: [Variant; 8] = [
     ("open-random-rgb", &[OF_OPEN, RANDOM, RGB]),
     ("plain", &[PLAIN]),
     ("reverse-rgb", &[REVERSE, RGB]),
-    ("peaked", &[("room.glb", "peaked.glb")]),
+    ("surfaces", &[("room.glb", "peaked.glb"), OF_SURFACES, RGB]),
     ("sky", &[OF_SKY]),
 ];
 
@@ -51,6 +63,7 @@ const VARIANTS: [Variant; 8] = [
 fn place() -> Place {
     let place = Place::new();
     let scene = fs::read(place.path("room.glb")).unwrap();
+    fs::write(place.path("floor.brdf"), FLOOR).unwrap();
     for (name, digit) in [("dull.glb", b'9'), ("peaked.glb", b'1')] {
         fs::write(place.path(name), polished(scene.clone(), digit)).unwrap();
     }
@@ -108,18 +121,23 @@ fn run(job: &Path, dir: &Path, workers: usize) -> Results {
     results(dir)
 }
 
-/// One worker; three workers; workers killed around the first checkpoint of every shard and resumed by two threads, in another
-/// order; a run extended from 16 batches, which end inside a shard; two folders merged: the same results.
+/// One worker; three workers with plain instructions; workers killed around the first checkpoint of every shard and resumed by two
+/// threads, with each kind of instructions in turn, in another order; a run extended from 16 batches, which end inside a shard; two folders merged: the same results.
 fn assert_exact(name: &str, changes: &[(&str, &str)]) {
     let place = place();
     let job = job_of(&place, name, changes);
     let straight = run(&job, &place.path("straight"), 1);
-    assert_eq!(straight, run(&job, &place.path("three"), 3), "{name}: workers");
+    let three = place.path("three");
+    expect(0, run_quietly(&job, &three, 3).env(simd::VARIABLE, simd::Path::Scalar.name()));
+    assert_eq!(straight, results(&three), "{name}: workers");
+    let mut paths = simd::Path::ALL.into_iter().filter(|path| path.is_available()).cycle();
     let dir = place.plan(&job, "killed");
     for shard in (0..SHARDS).rev() {
         // One shard goes on from its first checkpoint, the next one has lost it.
         die_at(&dir, shard, if shard % 2 == 0 { Step::AfterRename } else { Step::BeforeRename });
-        expect(0, lampyris(&["work", "--threads", "2", "--shard", &shard.to_string()]).arg(&dir));
+        let path = paths.next().expect("plain instructions are always there");
+        let mut work = lampyris(&["work", "--threads", "2", "--shard", &shard.to_string()]);
+        expect(0, work.env(simd::VARIABLE, path.name()).arg(&dir));
     }
     expect(0, lampyris(&["merge"]).arg(&dir));
     assert_eq!(straight, results(&dir), "{name}: kills and threads");

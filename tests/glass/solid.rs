@@ -6,6 +6,7 @@ use crate::common::{Case, assert_all, compare, flux};
 use lampyris::math::{DVec3, cos, sin};
 use lampyris::photometry::Colour;
 use lampyris::scene::{Delta, Glass, Model, Pane, Reflectance, Surface};
+use lampyris::validate::Experiment;
 use lampyris::validate::scenes::UP;
 
 fn glass(index: f64, absorption: f64) -> Surface {
@@ -86,4 +87,31 @@ fn a_clear_body_keeps_the_flux() {
     assert_eq!((flux(&batches, "escaped").mean, flux(&batches, "lost").mean), (0.0, 0.0));
     assert_all(&[compare("absorbed", absorbed, emitted.mean)]);
     assert!(flux(&batches, "met_delta").mean > 0.05 * emitted.mean);
+}
+
+/// What is said of the clear body when `change` was done to its scene.
+fn refusal(change: impl Fn(&mut Model)) -> String {
+    let mut model = with_body(&lambert(0.5, 1.0));
+    change(&mut model);
+    Experiment::new(&point("meter", [0.5, 0.1, 0.5], UP), model).map(|_| ()).unwrap_err().to_string()
+}
+
+#[test]
+fn a_body_that_is_open_or_inside_out_is_refused() {
+    let walls = 12;
+    let open = refusal(|model| {
+        model.triangles.truncate(model.triangles.len() - 1);
+        model.surface_of.pop();
+    });
+    assert!(open.contains("material wall, a body of glass = open from [") && open.contains("closed mesh"), "{open}");
+    // Closed all round, but one triangle shows its back.
+    let turned = refusal(|model| model.triangles[walls + 3].swap(0, 1));
+    assert!(turned.contains("open from"), "{turned}");
+    let inside_out = refusal(|model| model.triangles[walls..].iter_mut().for_each(|t| t.swap(0, 1)));
+    assert!(inside_out.contains("inside out"), "{inside_out}");
+    // The place is that of the file: the last triangle has its corners there.
+    let model = with_body(&lambert(0.5, 1.0));
+    let last = model.triangles.last().unwrap().map(|corner| model.positions[corner as usize].as_vec3().to_array());
+    let told = last.iter().filter(|corner| open.contains(&format!("{corner:?}"))).count();
+    assert_eq!(told, 2, "{open} {last:?}");
 }

@@ -192,7 +192,11 @@ fn what_transmits_is_glass() {
     let surface = &model.surfaces[0];
     assert!(matches!(&surface.reflectance, Reflectance::Delta(Delta::Pane(found)) if *found == pane));
     assert!(surface.double_sided && surface.is_veil() && model.warnings.is_empty(), "{:?}", model.warnings);
-    assert!(warns(&good(&glass(clear.clone(), 0.5)), "roughnessFactor is ignored"));
+    let frosted = good(&glass(clear.clone(), 0.5));
+    assert!(warns(&frosted, "roughnessFactor is ignored") && warns(&frosted, "kind = \"opal\""));
+    let mut veiled = glass(clear.clone(), 0.0);
+    veiled.json["materials"][0]["alphaMode"] = json!("BLEND");
+    assert!(warns(&good(&veiled), "alphaMode BLEND is ignored"));
 
     let mut thick = clear.clone();
     thick["KHR_materials_volume"] =
@@ -208,7 +212,8 @@ fn what_transmits_is_glass() {
     assert!(warns(&model, "as it emits") && !model.surfaces[0].is_veil());
 
     let some = json!({ "KHR_materials_transmission": { "transmissionFactor": 0.5 } });
-    assert!(warns(&good(&glass(some, 0.0)), "it is opaque"));
+    let model = good(&glass(some, 0.0));
+    assert!(warns(&model, "it is opaque") && warns(&model, "[[material]]") && !model.surfaces[0].is_veil());
     let none = json!({ "KHR_materials_transmission": {} });
     assert!(good(&glass(none, 0.0)).warnings.is_empty());
     for (extensions, field) in [

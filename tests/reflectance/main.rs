@@ -4,6 +4,7 @@ mod lanes;
 mod laws;
 mod quadrature;
 mod sampling;
+mod tables;
 
 use lampyris::math::{DVec3, PI};
 use lampyris::photometry::Colour;

@@ -3,7 +3,7 @@
 //! Each of the [`COMPARISONS`] statistical statements fails by chance with probability 1e-6 / COMPARISONS.
 
 use crate::quadrature::Incidence;
-use crate::{BASE, MIRROR, generator, integrated_albedo, law};
+use crate::{BASE, DIELECTRICS, MIRROR, generator, integrated_albedo, largest_difference, law};
 use lampyris::math::DVec3;
 use lampyris::photometry::Colour;
 use lampyris::random::{Generator, around_z};
@@ -101,6 +101,24 @@ fn directions_follow_their_density() {
         let fit = fit(&at, |w| law.pdf(NORMAL, at.w_in, w), || finite_direction(&law, &at, &mut rng));
         println!("alpha {alpha}, metallic {metallic}, mu {mu}: {:.1} of {:.1}", fit.statistic, fit.critical);
         assert!(fit.holds(), "alpha {alpha}, metallic {metallic}, mu {mu}: {} > {}", fit.statistic, fit.critical);
+    }
+}
+
+#[test]
+fn directions_follow_their_density_under_other_outer_surfaces() {
+    for (i, dielectric) in DIELECTRICS[..3].iter().enumerate() {
+        for (metallic, alpha, mu) in [(0.0, 0.1, 0.3), (0.4, 0.25, 0.7)] {
+            let law = Reflectance::layered(BASE, metallic, f64::sqrt(alpha), *dielectric);
+            let at = Incidence::new(NORMAL, mu, alpha);
+            let mut rng = generator(150 + i as u64);
+            let fit = fit(&at, |w| law.pdf(NORMAL, at.w_in, w), || finite_direction(&law, &at, &mut rng));
+            assert!(fit.holds(), "{dielectric:?}, {metallic}, {alpha}, {mu}: {} > {}", fit.statistic, fit.critical);
+            let mut mean = Colour::BLACK;
+            for _ in 0..DRAWS {
+                mean += law.sample(NORMAL, at.w_in, &mut rng).map_or(Colour::BLACK, |d| d.factor / DRAWS as f64);
+            }
+            assert!(largest_difference(mean, law.albedo(mu)) < 0.005, "{dielectric:?}: {mean:?} {:?}", law.albedo(mu));
+        }
     }
 }
 

@@ -5,6 +5,7 @@ use crate::job::Camera;
 use crate::math::DVec2;
 use crate::scene::Scene;
 use crate::transport::eye::{Eye, Gaze};
+use smallvec::{SmallVec, smallvec};
 
 /// A camera of a checked job, placed in a scene.
 pub struct CentreSight<'a> {
@@ -25,14 +26,15 @@ impl<'a> CentreSight<'a> {
         self.width * self.height
     }
 
-    /// The first surface along the ray through the centre of `pixel`, a mirror included; `None` where there is none.
-    pub fn primitive(&self, pixel: u32) -> Option<u32> {
+    /// The surfaces seen straight along the ray through the centre of `pixel`: the first that lets nothing through, a mirror included, and
+    /// the panes and veils before it.
+    pub fn surfaces(&self, pixel: u32) -> SmallVec<[u32; 2]> {
         let (column, row) = (f64::from(pixel % self.width), f64::from(pixel / self.width));
         let film = DVec2::new((column + 0.5) / f64::from(self.width), (row + 0.5) / f64::from(self.height));
         match self.eye.gaze(film) {
-            Gaze::Along(ray) => self.scene.geometry.closest_hit(&ray).map(|hit| hit.primitive),
-            Gaze::At(hit, _) => Some(hit.primitive),
-            Gaze::Nowhere => None,
+            Gaze::Along(ray) => self.scene.seen_along(&ray),
+            Gaze::At(hit, _) => smallvec![hit.primitive],
+            Gaze::Nowhere => SmallVec::new(),
         }
     }
 }

@@ -32,15 +32,25 @@ pub(super) fn glass(
     if share < 1.0 || transmission.transmission_texture.is_some() || metal {
         if share > 0.0 {
             warnings.add(format!(
-                "material `{name}`: it is opaque: only what transmits everything (transmissionFactor 1 without texture, metallicFactor 0) is glass"
+                "material `{name}`: it is opaque: only what transmits everything (transmissionFactor 1 without texture, metallicFactor 0) \
+                 is glass; [[material]] may make it a pane or opal"
             ));
         }
         return Ok(None);
     }
     if material.pbr_metallic_roughness.roughness_factor > 0.0 {
-        warnings.add(format!("material `{name}`: roughnessFactor is ignored: glass is polished"));
+        warnings.add(format!(
+            "material `{name}`: roughnessFactor is ignored: glass is polished; frosted glass is near to [[material]] with kind = \"opal\""
+        ));
+    }
+    if material.alpha_mode != "OPAQUE" {
+        warnings.add(format!("material `{name}`: alphaMode {} is ignored: it is glass all over", material.alpha_mode));
     }
     let Some(volume) = extensions.volume.as_ref().filter(|volume| volume.thickness_factor > 0.0) else {
+        if material.pbr_metallic_roughness.base_color_texture.is_some() {
+            warnings
+                .add(format!("material `{name}`: baseColorTexture counts by its mean: a pane is the same all over"));
+        }
         return Ok(Some(Reflectance::Delta(Delta::Pane(Pane::new(index, base)))));
     };
     if base != Colour::WHITE {

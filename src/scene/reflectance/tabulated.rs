@@ -1,23 +1,21 @@
 //! A law measured pair by pair: an isotropic table of f over two polar angles and the azimuth between them.
 //!
 //! Between nodes f is linear in each of the three angles, beyond the last polar angle constant. The table is the same when the two
-//! directions are exchanged, so the law is reciprocal. Directions are drawn from cells of equal sin^2(theta) and azimuth in
-//! proportion to what they reflect, of the node below or above the angle of arrival by its distance; a tenth is
-//! drawn by the cosine, so that no weight grows without bound. What is evaluated is the density with which that is done.
+//! directions are exchanged, so the law is reciprocal. Directions are drawn from the cells of the table in proportion to what they
+//! reflect, of the node below or above the angle of arrival by its distance, and in a cell uniformly in sin^2(theta) and azimuth.
+//! Where f is linear it is at most a few times its mean, so no weight grows without bound. What is evaluated is the density with
+//! which that is done.
 //! `docs/brdf-format.md`: the text, read by `text`.
 
+mod cells;
 mod text;
 
 use super::{Scattered, above};
-use crate::math::{DVec3, PI, acos, frame};
+use crate::math::{DVec2, DVec3, PI, acos, frame};
 use crate::photometry::Colour;
 use crate::random::{Generator, around_z};
+use cells::{Axis, cell, inside};
 use std::sync::Arc;
-
-/// Cells of sin^2 of the angle of departure, and of half the azimuth.
-const CELLS: usize = 48;
-/// Share of directions that is drawn by the cosine.
-const BY_COSINE: f64 = 0.1;
 
 /// A tabulated law.
 #[derive(Clone)]
@@ -36,6 +34,8 @@ struct Table {
     azimuths: Vec<f64>,
     /// f by polar angle, polar angle and azimuth \[1/sr\].
     values: Vec<Colour>,
+    /// The cells of directions of departure: sin^2 of the polar angle, and azimuth.
+    axes: [Axis; 2],
     /// Of each polar angle of arrival the directional albedo.
     albedos: Vec<Colour>,
     /// Of each polar angle of arrival the running sum of the probabilities of the cells.
@@ -54,7 +54,8 @@ fn place(nodes: &[f64], x: f64) -> Place {
 impl Tabulated {
     /// The law of `values` \[1/sr\] by polar angle, polar angle and azimuth, the same both ways.
     fn new(polar: Vec<f64>, azimuths: Vec<f64>, values: Vec<Colour>) -> Self {
-        let mut table = Table { polar, azimuths, values, albedos: Vec::new(), sums: Vec::new() };
+        let axes = [Axis::polar(&polar), Axis::azimuths(&azimuths)];
+        let mut table = Table { polar, azimuths, values, axes, albedos: Vec::new(), sums: Vec::new() };
         for i in 0..table.polar.len() {
             let (albedo, sums) = table.cells(i);
             table.albedos.push(albedo);
@@ -76,17 +77,15 @@ impl Tabulated {
             return 0.0;
         }
         let (theta, cosine) = (acos((-w_in.dot(normal)).min(1.0)), w_out.dot(normal));
-        let cell = |x: f64| ((x * CELLS as f64) as usize).min(CELLS - 1);
-        let number = cell(1.0 - cosine * cosine) * CELLS + cell(azimuth(normal, -w_in, w_out) / PI);
+        let (number, area) = cell(&self.0.axes, DVec2::new(1.0 - cosine * cosine, azimuth(normal, -w_in, w_out)));
         let (i, t) = place(&self.0.polar, theta);
-        let of_node = |i: usize| match self.0.sums.get(i) {
-            Some(sums) => sums[number] - number.checked_sub(1).map_or(0.0, |before| sums[before]),
-            None => 0.0,
+        let of_node = |i: usize| {
+            let sums = &self.0.sums[i];
+            sums[number] - number.checked_sub(1).map_or(0.0, |before| sums[before])
         };
         let probability = of_node(i) * (1.0 - t) + if t > 0.0 { of_node(i + 1) * t } else { 0.0 };
-        let cells = (CELLS * CELLS) as f64;
-        // Uniform in sin^2 and azimuth is the cosine's density.
-        (BY_COSINE + (1.0 - BY_COSINE) * probability * cells) * cosine / PI
+        // Uniform in sin^2 and azimuth over the hemisphere, an area of pi, is the cosine's density.
+        if area > 0.0 { probability / area * cosine } else { 0.0 }
     }
 
     /// One uniform for the cell, two for the place in it.
@@ -94,16 +93,10 @@ impl Tabulated {
         let (i, t) = place(&self.0.polar, acos((-w_in.dot(normal)).clamp(0.0, 1.0)));
         let sums = &self.0.sums[if t > 0.0 && rng.chance(t) { i + 1 } else { i }];
         let (choice, u) = (rng.uniform(), rng.uniform2());
-        let (square, turn) = if choice < BY_COSINE {
-            (u.x, 2.0 * u.y - 1.0)
-        } else {
-            let target = (choice - BY_COSINE) / (1.0 - BY_COSINE);
-            let cell = sums.partition_point(|&sum| sum <= target).min(sums.len() - 1);
-            let (row, column) = ((cell / CELLS) as f64, (cell % CELLS) as f64);
-            let side = 2.0 * u.y - 1.0;
-            ((row + u.x) / CELLS as f64, (column + side.abs()) / CELLS as f64 * side.signum())
-        };
-        let local = around_z((1.0 - square).sqrt(), 0.5 * turn);
+        let number = sums.partition_point(|&sum| sum <= choice).min(sums.len() - 1);
+        let side = 2.0 * u.y - 1.0;
+        let at = inside(&self.0.axes, number, DVec2::new(u.x, side.abs()));
+        let local = around_z((1.0 - at.x).max(0.0).sqrt(), at.y.copysign(side) / (2.0 * PI));
         // The azimuth counts from where the light came from.
         let back = -w_in - normal * (-w_in).dot(normal);
         let x = if back.length_squared() > 1e-24 { back.normalize() } else { frame(normal).0 };
@@ -136,6 +129,11 @@ impl Tabulated {
 }
 
 impl Table {
+    /// f at the nodes \[1/sr\].
+    fn value(&self, i: usize, j: usize, k: usize) -> Colour {
+        self.values[(i * self.polar.len() + j) * self.azimuths.len() + k]
+    }
+
     /// f at two polar angles and an azimuth: the smaller angle first, so that exchanging them changes no bit.
     fn at(&self, one: f64, other: f64, azimuth: f64) -> Colour {
         let (i, s) = place(&self.polar, one.min(other));
@@ -146,7 +144,7 @@ impl Table {
             for (j, t) in [(j, 1.0 - t), (j + 1, t)] {
                 for (k, u) in [(k, 1.0 - u), (k + 1, u)] {
                     if s * t * u > 0.0 {
-                        sum += self.values[(i * self.polar.len() + j) * self.azimuths.len() + k] * (s * t * u);
+                        sum += self.value(i, j, k) * (s * t * u);
                     }
                 }
             }
@@ -154,32 +152,25 @@ impl Table {
         sum
     }
 
-    /// Directional albedo at node `i` of arrival, and the running sum of what the cells reflect of it. With s = sin^2 the albedo is
-    /// int f ds dphi over half the azimuth.
+    /// Directional albedo at node `i` of arrival, and the running sum of the shares of it that the cells reflect.
     fn cells(&self, i: usize) -> (Colour, Vec<f64>) {
-        // Two points of Gauss a side.
-        let points = [0.5 - 0.5 / 3f64.sqrt(), 0.5 + 0.5 / 3f64.sqrt()];
-        let (mut albedo, mut sum, mut sums) = (Colour::BLACK, 0.0, Vec::with_capacity(CELLS * CELLS));
-        for cell in 0..CELLS * CELLS {
-            let mut value = Colour::BLACK;
-            for x in points {
-                for y in points {
-                    let square = ((cell / CELLS) as f64 + x) / CELLS as f64;
-                    let azimuth = PI * ((cell % CELLS) as f64 + y) / CELLS as f64;
-                    value += self.at(self.polar[i], acos((1.0 - square).sqrt()), azimuth) * 0.25;
+        let [polar, azimuths] = &self.axes;
+        let (mut albedo, mut sums) = (Colour::BLACK, Vec::with_capacity(polar.parts() * azimuths.parts()));
+        for row in 0..polar.parts() {
+            for column in 0..azimuths.parts() {
+                for (j, u) in polar.corners(row) {
+                    for (k, v) in azimuths.corners(column) {
+                        albedo += self.value(i, j, k) * (u * v);
+                    }
                 }
+                sums.push(albedo.luminance());
             }
-            albedo += value * (PI / (CELLS * CELLS) as f64);
-            sum += value.luminance();
-            sums.push(sum);
         }
+        let all = albedo.luminance();
         // Of a black angle all cells are alike.
-        let share = |(number, part): (usize, &f64)| match sum > 0.0 {
-            true => part / sum,
-            false => (number + 1) as f64 / (CELLS * CELLS) as f64,
-        };
-        let sums = sums.iter().enumerate().map(share).collect();
-        (albedo, sums)
+        let count = sums.len() as f64;
+        let share = |(number, part): (usize, f64)| if all > 0.0 { part / all } else { (number + 1) as f64 / count };
+        (albedo, sums.into_iter().enumerate().map(share).collect())
     }
 }
 

@@ -13,7 +13,7 @@ const MOST_ANGLES: usize = 256;
 const MOST: f64 = 1e6;
 /// How much a value may differ from that of the exchanged directions, as a share of the greater.
 const TOLERATED: f64 = 0.1;
-/// How much of what it receives a table may seem to reflect: what sums over cells make of all.
+/// How much of what it receives a table may seem to reflect: what rounded decimals make of all.
 const FULL: f64 = 1.0 + 1e-6;
 
 impl Tabulated {
@@ -38,7 +38,8 @@ impl Tabulated {
         };
         let polar = lines.angles("theta", 90.0)?;
         let azimuths = lines.angles("phi", 180.0)?;
-        let (mut values, mut places) = (Vec::with_capacity(polar.len() * polar.len() * azimuths.len()), Vec::new());
+        // As much memory as there is text: the angles alone promise what they like.
+        let (mut values, mut places) = (Vec::new(), Vec::new());
         for _ in 0..polar.len() * polar.len() {
             let row = lines.numbers(azimuths.len() * channels)?;
             places.push(lines.at);
