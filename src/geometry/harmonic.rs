@@ -125,8 +125,8 @@ impl Star {
         normal_and_area(&self.series.slope(n0), n0)
     }
 
-    /// The first crossing of the line from `o` along the unit vector `d`, at most `end` away.
-    pub fn first_crossing(&self, o: DVec3, d: DVec3, end: f64) -> Option<Crossing> {
+    /// The first crossing of the line from `o` along the unit vector `d`, at most `limit` away.
+    pub fn first_crossing(&self, o: DVec3, d: DVec3, limit: f64) -> Option<Crossing> {
         let nearest = -o.dot(d);
         let across2 = (o + nearest * d).length_squared();
         let (low, high) = self.radii();
@@ -135,7 +135,7 @@ impl Star {
             return None;
         }
         let mut at = (nearest - reach2.sqrt()).max(0.0);
-        let end = end.min(nearest + reach2.sqrt());
+        let end = limit.min(nearest + reach2.sqrt());
         // The line inside the ball that lies within the surface; empty where it misses that.
         let half_core = (low * low - across2).max(0.0).sqrt();
         let core = nearest - half_core..nearest + half_core;
@@ -172,7 +172,8 @@ impl Star {
             }
             let falls = Fall { from: at, side, along: guess.times(side), errors, around };
             if let Some(crossing) = if side == 0.0 { None } else { self.only_crossing(o, d, &falls) } {
-                return (crossing.distance <= end).then_some(crossing);
+                // Rounding may put it beyond the ball, whose end is no limit.
+                return (crossing.distance <= limit).then_some(crossing);
             }
             let here = self.height(x, d);
             if side == 0.0 {
