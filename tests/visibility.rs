@@ -138,7 +138,7 @@ fn compare(name: &str, geometry: Geometry, brute: &Brute, apex: Vec3, points: &[
     let mut geometry = geometry;
     for path in available() {
         geometry = geometry.with_path(path);
-        let tile = Points::new(&geometry, points, 64);
+        let tile = Points::new(&geometry, points);
         let mut seen = asked;
         geometry.hide(apex, &tile, &mut seen, &mut Scratch::default());
         for (i, &point) in points.iter().enumerate() {
@@ -440,7 +440,7 @@ fn keeps_in(closed: &Closed, tiles: usize) {
         assert!(points.iter().all(|p| p.as_dvec3().length() > *outside));
         for path in available() {
             geometry = geometry.with_path(path);
-            let tile = Points::new(&geometry, &points, 64);
+            let tile = Points::new(&geometry, &points);
             let mut seen: Lanes = [u16::MAX; BUNDLES];
             geometry.hide(apex, &tile, &mut seen, &mut Scratch::default());
             assert_eq!(seen, [0; BUNDLES], "{name}, {path:?}: tile {i} leaks from {apex}");

@@ -52,7 +52,7 @@ fn bench(scene: Scene) {
     );
     let points = |receivers: &[Place]| {
         let points: Vec<Vec3> = receivers.iter().map(|p| p.point).collect();
-        Points::new(&geometry, &points, 64)
+        Points::new(&geometry, &points)
     };
     let tiles: Vec<Points> = segments.receivers.chunks(TILE).map(points).collect();
     let facing: Vec<Vec<Lanes>> = segments.vertices.iter().map(|v| facing(v, &segments.receivers)).collect();

@@ -59,7 +59,7 @@ impl Closed {
             let points: Vec<Vec3> = (0..TILE).map(|_| self.beyond(&mut rng, apex, one)).collect();
             for &path in paths {
                 geometry = geometry.with_path(path);
-                let tiles = [Points::new(&geometry, &points, 64)];
+                let tiles = [Points::new(&geometry, &points)];
                 let mut seen = [[u16::MAX; BUNDLES]];
                 shadow(&geometry, apex, &tiles, &mut seen);
                 leaks += seen[0].iter().map(|lanes| u64::from(lanes.count_ones())).sum::<u64>();

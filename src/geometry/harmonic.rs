@@ -18,11 +18,14 @@
 //! From inside -F is taken.
 
 pub(in crate::geometry) mod beside;
+mod between;
 mod bounds;
 pub mod file;
-mod horizon;
 mod lattice;
 mod placed;
+mod projection;
+mod regions;
+mod rise;
 mod samples;
 mod series;
 mod shells;
@@ -30,11 +33,13 @@ mod steps;
 
 pub use bounds::Bounds;
 pub use placed::Harmonic;
-pub use series::{Bend, MAX_DEGREE, Series, Slope, basis, projection};
+pub use projection::{basis, projection};
+pub use series::{Bend, MAX_DEGREE, Series, Slope};
 
 use crate::error::{Error, Result};
 use crate::math::{DVec3, PI};
 use bounds::bends;
+use regions::Steepness;
 use samples::Samples;
 use std::sync::Arc;
 use steps::{Taylor, safe_step};
@@ -43,8 +48,11 @@ use steps::{Taylor, safe_step};
 const ROUNDING: f64 = 1e-14;
 /// Steps after which a line that only grazes the surface counts as meeting it.
 const MAX_STEPS: usize = 4096;
-/// How far one look tells that a line is clear, at most, as a share of the distance from the centre.
-const CLEAR: f64 = 0.25;
+
+/// Steps of Newton's method, at most.
+const NEWTON: usize = 6;
+/// F in units of the largest radius from where on one more step is exact.
+const CONVERGED: f64 = 1e-11;
 
 /// A series as a surface, in its own coordinates.
 #[derive(Clone, Debug)]
@@ -63,6 +71,15 @@ pub struct Crossing {
     pub position: DVec3,
     /// Outward unit normal.
     pub normal: DVec3,
+}
+
+/// F along a line, times `side`, by the samples, from a place on where it is not negative.
+struct Fall<'a> {
+    from: f64,
+    side: f64,
+    along: Taylor,
+    errors: Taylor,
+    around: &'a Steepness,
 }
 
 /// F and its derivatives along a line, and where.
@@ -108,8 +125,8 @@ impl Star {
         normal_and_area(&self.series.slope(n0), n0)
     }
 
-    /// The first crossing of the line from `o` along the unit vector `d`, at most `end` away.
-    pub fn first_crossing(&self, o: DVec3, d: DVec3, end: f64) -> Option<Crossing> {
+    /// The first crossing of the line from `o` along the unit vector `d`, at most `limit` away.
+    pub fn first_crossing(&self, o: DVec3, d: DVec3, limit: f64) -> Option<Crossing> {
         let nearest = -o.dot(d);
         let across2 = (o + nearest * d).length_squared();
         let (low, high) = self.radii();
@@ -118,7 +135,7 @@ impl Star {
             return None;
         }
         let mut at = (nearest - reach2.sqrt()).max(0.0);
-        let end = end.min(nearest + reach2.sqrt());
+        let end = limit.min(nearest + reach2.sqrt());
         // The line inside the ball that lies within the surface; empty where it misses that.
         let half_core = (low * low - across2).max(0.0).sqrt();
         let core = nearest - half_core..nearest + half_core;
@@ -138,14 +155,25 @@ impl Star {
                 continue;
             }
             let x = o + at * d;
-            let (guess, errors) = self.samples.height(x, d);
+            let (guess, errors, around) = self.samples.height(x, d);
             let guessed = if side == 0.0 { guess.value.signum() } else { side };
+            let step = |along: &Taylor, side: f64| {
+                // What holds around here, and where that is not far enough what holds everywhere.
+                let (far, enough) = (self.samples.reach() * x.length(), enough(at));
+                let step = safe_step(along, around.of_lines(x.length() - far, side), enough.min(far));
+                let ends = step < far || enough <= far;
+                if ends { step } else { step.max(safe_step(along, self.derivatives(within(x, at), side), enough)) }
+            };
             if guessed * guess.value > 2.0 * errors.value {
                 side = guessed;
-                let bounds = self.derivatives(within(x, at), side);
-                let next = at + safe_step(&guess.times(side).less(errors), bounds, enough(at));
+                let next = at + step(&guess.times(side).less(errors), side);
                 at = if side < 0.0 && at < core.start { next.min(core.end) } else { next };
                 continue;
+            }
+            let falls = Fall { from: at, side, along: guess.times(side), errors, around };
+            if let Some(crossing) = if side == 0.0 { None } else { self.only_crossing(o, d, &falls) } {
+                // Rounding may put it beyond the ball, whose end is no limit.
+                return (crossing.distance <= limit).then_some(crossing);
             }
             let here = self.height(x, d);
             if side == 0.0 {
@@ -160,9 +188,8 @@ impl Star {
             if along.value <= floor && (along.first <= 0.0 || along.value < -floor) {
                 break;
             }
-            let step = safe_step(&along, self.derivatives(within(x, at), side), enough(at));
             // From inside the bound holds outside the core only, beyond which all is known.
-            let next = at + step;
+            let next = at + step(&along, side);
             let next = if side < 0.0 && at < core.start { next.min(core.end) } else { next };
             if next <= at {
                 break;
@@ -174,23 +201,46 @@ impl Star {
         Some(Crossing { distance: at, position: height.slope.value * height.direction, normal })
     }
 
+    /// The crossing of the line from `o` along `d` near a place where F, or -F, is not negative and falls so steeply that it certainly crosses 0 once
+    /// from there on, without having turned: by Newton's method with the second derivative of the samples.
+    fn only_crossing(&self, o: DVec3, d: DVec3, fall: &Fall) -> Option<Crossing> {
+        let Fall { from, side: sign, along, errors, around } = fall;
+        let length = (o + *from * d).length();
+        let [most, _] = around.of_lines((1.0 - self.samples.reach()) * length, -1.0);
+        let (value, steep) = (along.value.max(0.0) + errors.value, -along.first - errors.first);
+        // At twice the way to the zero of the tangent F is below 0, and its slope still is.
+        let falls = steep > 0.0 && 4.0 * most * value < steep * steep;
+        if !falls || 2.0 * value > steep * self.samples.reach() * length {
+            return None;
+        }
+        let way = |value: f64, fall: f64| value / fall * (1.0 + 0.5 * along.second * value / (fall * fall));
+        let mut at = from + way(along.value, -along.first);
+        for _ in 0..NEWTON {
+            let x = o + at * d;
+            let length = x.length();
+            let n = x / length;
+            let slope = self.series.slope(n);
+            let value = sign * (length - slope.value);
+            let fall = -sign * (n.dot(d) - slope.gradient.dot(d) / length);
+            if fall.is_nan() || fall <= 0.0 {
+                return None;
+            }
+            at += way(value, fall);
+            if value.abs() <= CONVERGED * self.bounds.high {
+                let (normal, _) = normal_and_area(&slope, n);
+                let there = (o + at * d).normalize();
+                let position = (slope.value + slope.gradient.dot(there - n)) * there;
+                return Some(Crossing { distance: at, position, normal });
+            }
+        }
+        None
+    }
+
     /// Bounds of the second and third derivatives of F, or of -F where `side` is negative, where |x| is at least `least`: of how far
     /// the second falls, of how far the third goes either way.
     fn derivatives(&self, least: f64, side: f64) -> [f64; 2] {
         let Bounds { first, second, third, .. } = self.bounds;
-        let square = least * least;
-        // |x| itself only bends up.
-        let of_length = if side < 0.0 { 1.0 / least } else { 0.0 };
-        let of_second = (0.5 * second + (0.25 * second * second + first * first).sqrt()) / square + of_length;
-        [of_second, (third + 2.31 * second + 2.0 * first) / (square * least) + 1.16 / square]
-    }
-
-    /// How far from `x` outside, where the series has the derivatives `bend`, the line along the unit vector `d` is certain to meet
-    /// nothing, up to `enough`.
-    pub(in crate::geometry) fn clear(&self, x: DVec3, d: DVec3, enough: f64, bend: &Bend) -> f64 {
-        let length = x.length();
-        let least = self.bounds.low.max((1.0 - CLEAR) * length);
-        safe_step(&height(x, d, bend).along, self.derivatives(least, 1.0), enough.min(CLEAR * length))
+        Steepness { first, second, third }.of_lines(least, side)
     }
 
     fn height(&self, x: DVec3, d: DVec3) -> Height {

@@ -183,10 +183,13 @@ impl Geometry {
     pub fn closest_hits(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
         assert_eq!(rays.len(), hits.len(), "a hit for each ray");
         self.mesh.closest_hits(rays, hits);
-        if self.has_others() {
+        if !self.spheres.is_empty() || !self.planes.is_empty() {
             for (ray, hit) in rays.iter().zip(&mut *hits) {
-                *hit = self.closest_of_all(ray, *hit);
+                *hit = self.closest_of_quadrics(ray, *hit);
             }
+        }
+        for (number, harmonic) in (self.first_harmonic()..).zip(&self.harmonics) {
+            harmonic.hits(rays, hits, number);
         }
         if self.veils.is_some() {
             for (ray, hit) in rays.iter().zip(hits) {
@@ -201,19 +204,29 @@ impl Geometry {
     }
 
     /// The first surface along `ray`, which meets the triangles at `best`.
-    fn closest_of_all(&self, ray: &Ray, mut best: Option<Hit>) -> Option<Hit> {
-        let mut number = self.triangles() as u32;
-        let mut offer = |find: &dyn Fn(f64) -> Option<Hit>| {
-            let limit = best.map_or(f64::INFINITY, |b| b.distance);
-            if let Some(hit) = find(limit).filter(|hit| hit.distance < limit) {
-                best = Some(Hit { primitive: number, ..hit });
-            }
-            number += 1;
-        };
-        self.spheres.iter().for_each(|s| offer(&|_| s.hit(ray)));
-        self.planes.iter().for_each(|p| offer(&|_| p.hit(ray)));
-        self.harmonics.iter().for_each(|h| offer(&|limit| h.hit(ray, limit)));
+    fn closest_of_all(&self, ray: &Ray, best: Option<Hit>) -> Option<Hit> {
+        let mut best = self.closest_of_quadrics(ray, best);
+        for (number, harmonic) in (self.first_harmonic()..).zip(&self.harmonics) {
+            best = nearer(best, number, |limit| harmonic.hit(ray, limit));
+        }
         best
+    }
+
+    /// The same without what is given by series.
+    fn closest_of_quadrics(&self, ray: &Ray, mut best: Option<Hit>) -> Option<Hit> {
+        let mut numbers = self.triangles() as u32..;
+        for (sphere, number) in self.spheres.iter().zip(&mut numbers) {
+            best = nearer(best, number, |_| sphere.hit(ray));
+        }
+        for (plane, number) in self.planes.iter().zip(&mut numbers) {
+            best = nearer(best, number, |_| plane.hit(ray));
+        }
+        best
+    }
+
+    /// The primitive number of the first star-shaped object.
+    fn first_harmonic(&self) -> u32 {
+        self.triangles() as u32 + (self.spheres.len() + self.planes.len()) as u32
     }
 
     /// How far points of bounded geometry are lifted \[m\]: thinner things cannot cast a shadow on what touches them.
@@ -266,6 +279,12 @@ fn probe_directions() -> impl Iterator<Item = DVec3> {
         .flat_map(move |x| corners.into_iter().flat_map(move |y| corners.map(|z| DVec3::new(x, y, z))));
     let tilt = DVec3::new(0.0131, -0.0071, 0.0173);
     axes.chain(diagonals).map(move |d| (d.normalize() + tilt).normalize())
+}
+
+/// `best`, or what `find` finds nearer as the primitive `number`.
+fn nearer(best: Option<Hit>, number: u32, find: impl FnOnce(f64) -> Option<Hit>) -> Option<Hit> {
+    let limit = best.map_or(f64::INFINITY, |b| b.distance);
+    find(limit).filter(|hit| hit.distance < limit).map(|hit| Hit { primitive: number, ..hit }).or(best)
 }
 
 fn union(a: (DVec3, DVec3), b: (DVec3, DVec3)) -> (DVec3, DVec3) {

@@ -107,7 +107,7 @@ struct Directions<'a> {
 
 /// The least and the greatest lane.
 #[inline(always)]
-fn range<I: Isa>(lanes: &[f32; RAYS]) -> (f32, f32) {
+pub(super) fn range<I: Isa>(lanes: &[f32; RAYS]) -> (f32, f32) {
     let half = |at: usize| I::Eight::load(lanes[at..at + 8].try_into().expect("8 of 16"));
     let (mut least, mut most) = ([0.0; 8], [0.0; 8]);
     half(0).min(half(8)).store(&mut least);

@@ -26,6 +26,8 @@
 //! A lifted point lies 16 u (max |p| + D) off its own surface, D the diagonal of the geometry: more than 10.2 u D, so the
 //! surface that a receiver stands on never needs f64.
 
+mod before;
+
 use super::bvh::{Node, WIDTH};
 use super::simd::{Isa, Vector};
 use crate::math::Vec3;

@@ -29,6 +29,8 @@ enum Way {
 pub(super) struct Shaft {
     apex: [f32; 3],
     pub(super) directions: Directions,
+    /// The share of the segments that is left out, at their start.
+    start: f32,
     ways: [Way; 3],
     /// By axis, factor and term of the first time at the low side of a box where segments enter there, or else the last.
     low: [(f32, f32); 3],
@@ -49,7 +51,8 @@ impl Shaft {
     #[inline(always)]
     pub(super) fn along(apex: [f32; 3], least: [f32; 3], most: [f32; 3]) -> Self {
         let directions = Directions::new(least, most);
-        let mut shaft = Shaft { apex, directions, ways: [Way::Both; 3], low: [(0.0, 0.0); 3], high: [(0.0, 0.0); 3] };
+        let (ways, times) = ([Way::Both; 3], [(0.0, 0.0); 3]);
+        let mut shaft = Shaft { apex, directions, start: 0.0, ways, low: times, high: times };
         for axis in 0..3 {
             let (mut least, mut most) = (least[axis], most[axis]);
             if least > NIL {
@@ -67,6 +70,13 @@ impl Shaft {
         shaft
     }
 
+    /// The same without what is before the share `start`.
+    #[inline(always)]
+    pub(super) fn after(mut self, start: f32) -> Self {
+        self.start = start;
+        self
+    }
+
     /// The children of `node` whose boxes some segment may meet.
     #[inline(always)]
     pub(super) fn meets<I: Isa>(&self, node: &Node) -> u32 {
@@ -76,7 +86,7 @@ impl Shaft {
     /// The children of `node` whose boxes some ray, 0 <= t <= `end`, may meet, and when the first of them does.
     #[inline(always)]
     pub(super) fn meets_before<I: Isa>(&self, node: &Node, end: f32) -> (u32, I::Eight) {
-        let (mut enter, mut leave) = (I::Eight::splat(0.0), I::Eight::splat(end));
+        let (mut enter, mut leave) = (I::Eight::splat(self.start), I::Eight::splat(end));
         for axis in 0..3 {
             let low = times::<I>(&node.low[axis], self.low[axis]);
             let high = times::<I>(&node.high[axis], self.high[axis]);
@@ -101,19 +111,27 @@ pub(super) struct Bundle<I: Isa> {
     ways: [Way; 3],
     factor: [I::Sixteen; 3],
     term: [I::Sixteen; 3],
+    start: I::Sixteen,
 }
 
 impl<I: Isa> Bundle<I> {
     /// The segments along `d`, all in `shaft`.
     #[inline(always)]
     pub(super) fn new(shaft: &Shaft, d: &[I::Sixteen; 3]) -> Self {
-        let mut bundle = Bundle::<I> { ways: shaft.ways, factor: *d, term: *d };
+        let mut bundle = Bundle::<I> { ways: shaft.ways, factor: *d, term: *d, start: I::Sixteen::splat(shaft.start) };
         for axis in 0..3 {
             let d = d[axis].abs().max(I::Sixteen::splat(NIL)).flip(d[axis]);
             let factor = I::Sixteen::splat(1.0).div(d);
             (bundle.factor[axis], bundle.term[axis]) = (factor, factor.mul(I::Sixteen::splat(-shaft.apex[axis])));
         }
         bundle
+    }
+
+    /// The same without what is before the shares `starts`.
+    #[inline(always)]
+    pub(super) fn after(mut self, starts: I::Sixteen) -> Self {
+        self.start = starts;
+        self
     }
 
     /// The segments that may meet box `slot` of `node`.
@@ -126,7 +144,7 @@ impl<I: Isa> Bundle<I> {
     #[inline(always)]
     pub(super) fn meets_before(&self, node: &Node, slot: usize, ends: I::Sixteen) -> u32 {
         debug_assert!(slot < WIDTH);
-        let (mut enter, mut leave) = (I::Sixteen::splat(0.0), ends);
+        let (mut enter, mut leave) = (self.start, ends);
         for axis in 0..3 {
             let (factor, term) = (self.factor[axis], self.term[axis]);
             let low = I::Sixteen::splat(node.low[axis][slot]).mul_add(factor, term);

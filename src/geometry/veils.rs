@@ -72,11 +72,14 @@ impl Geometry {
     ) {
         let Some(veils) = &self.veils else { return };
         let near = veils.is_near(apex.as_dvec3());
-        if near && !veils.are_met(&Shaft::new(apex.to_array(), points.tile.0, points.tile.1)) && points.far == [0; 16] {
+        if near
+            && !veils.are_met(&Shaft::new(apex.to_array(), points.ends.tile.0, points.ends.tile.1))
+            && points.ends.far == [0; 16]
+        {
             return;
         }
         for (bundle, &seen) in seen.iter().enumerate().filter(|(_, seen)| **seen != 0) {
-            let alone = if near { seen & points.far[bundle] } else { seen };
+            let alone = if near { seen & points.ends.far[bundle] } else { seen };
             for lane in bits(u32::from(alone)) {
                 self.veils_between(apex, points.point(bundle, lane), |crossing| visit(bundle, lane, crossing));
             }
@@ -84,7 +87,7 @@ impl Geometry {
             if together == 0 {
                 continue;
             }
-            let (low, high) = points.bundles[bundle];
+            let (low, high) = points.ends.bundles[bundle];
             veils.blocks_met(&Shaft::new(apex.to_array(), low, high), |triangle| {
                 let sheet = Sheet::new(triangle, apex.as_dvec3());
                 for lane in bits(u32::from(together)) {
@@ -242,7 +245,7 @@ mod tests {
         let mut told = 0;
         for far in [1.0, 1.0, 1.0, 30.0] {
             let points: Vec<Vec3> = (0..TILE).map(|i| point(&mut rng) * if i % 3 == 0 { far } else { 0.3 }).collect();
-            let tile = Points::new(&geometry, &points, usize::MAX);
+            let tile = Points::new(&geometry, &points);
             for apex in [point(&mut rng), point(&mut rng) * far, point(&mut rng) * 0.1] {
                 let mut of_tile = vec![Vec::new(); TILE];
                 let seen = [0xffff; 16];

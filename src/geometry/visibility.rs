@@ -17,18 +17,20 @@
 //! taken out of `hit` and given to f64 code of their own.
 
 mod bundle;
+mod starts;
 
 use super::bvh::Node;
 use super::mesh::{Mesh, bits};
-use super::planes::{Directions, Extent, Planes, Rows};
-use super::points::Corners;
+use super::planes::{Against, Decided, Directions, Extent, Planes, Rows};
+use super::points::{Corners, Ends};
 use super::shaft::Shaft;
-use super::simd::{Isa, Kernel};
+use super::simd::{Isa, Kernel, Vector};
 use super::{Geometry, Sphere};
 use crate::math::Vec3;
 use arrayvec::ArrayVec;
 
 pub use super::points::Points;
+pub(super) use starts::Starts;
 
 /// Points of a tile.
 pub const TILE: usize = 256;
@@ -53,7 +55,7 @@ pub type Lanes = [u16; BUNDLES];
 impl Geometry {
     /// Clears the bits of the points in `seen` that `apex` does not see.
     pub fn hide(&self, apex: Vec3, points: &Points, seen: &mut Lanes, scratch: &mut Scratch) {
-        self.mesh.hide(apex, points, seen, scratch);
+        self.mesh.hide(apex, &points.ends, seen, scratch);
         let far = apex.as_dvec3();
         for (plane, [front, behind]) in self.planes.iter().zip(&points.sides) {
             let height = plane.height(far);
@@ -75,7 +77,8 @@ impl Geometry {
 struct Hide<'a> {
     mesh: &'a Mesh,
     apex: Vec3,
-    points: &'a Points,
+    starts: Option<&'a Starts>,
+    points: &'a Ends,
     seen: &'a mut Lanes,
     scratch: &'a mut Scratch,
 }
@@ -85,7 +88,8 @@ impl Kernel for Hide<'_> {
 
     #[inline(always)]
     fn run<I: Isa>(self) {
-        self.mesh.shadow::<I>(self.apex, self.points, self.seen, self.scratch);
+        let Hide { mesh, apex, starts, points, seen, scratch } = self;
+        mesh.shadow::<I>(apex, starts, points, seen, scratch);
     }
 }
 
@@ -106,14 +110,33 @@ fn shadow_of_sphere(sphere: &Sphere, apex: Vec3, points: &Points, inside: &Lanes
 impl Mesh {
     /// Clears the bits of the points in `seen` between which and `apex` a triangle stands, with the instructions of the processor:
     /// compiled once for all callers.
-    pub(super) fn hide(&self, apex: Vec3, points: &Points, seen: &mut Lanes, scratch: &mut Scratch) {
+    pub(super) fn hide(&self, apex: Vec3, points: &Ends, seen: &mut Lanes, scratch: &mut Scratch) {
+        self.hide_after(apex, None, points, seen, scratch);
+    }
+
+    /// The same without what is at the start of segments.
+    pub(super) fn hide_after(
+        &self,
+        apex: Vec3,
+        starts: Option<&Starts>,
+        points: &Ends,
+        seen: &mut Lanes,
+        scratch: &mut Scratch,
+    ) {
         if !self.is_empty() {
-            self.path.run(Hide { mesh: self, apex, points, seen, scratch });
+            self.path.run(Hide { mesh: self, apex, starts, points, seen, scratch });
         }
     }
 
     #[inline(always)]
-    fn shadow<I: Isa>(&self, apex: Vec3, points: &Points, seen: &mut Lanes, scratch: &mut Scratch) {
+    fn shadow<I: Isa>(
+        &self,
+        apex: Vec3,
+        starts: Option<&Starts>,
+        points: &Ends,
+        seen: &mut Lanes,
+        scratch: &mut Scratch,
+    ) {
         if !self.is_near(apex.as_dvec3()) {
             return self.shadow_one_by_one(apex, points, &[u16::MAX; BUNDLES], seen);
         }
@@ -124,7 +147,7 @@ impl Mesh {
         let mut near = *seen;
         near.iter_mut().zip(&points.far).for_each(|(near, far)| *near &= !far);
         // In one place: it is long, and compiled whole.
-        let mut descent = Descent { mesh: self, points, apex: apex.to_array(), scratch };
+        let mut descent = Descent { mesh: self, starts, points, apex: apex.to_array(), scratch };
         descent.tile::<I>(&mut near);
         for ((seen, near), far) in seen.iter_mut().zip(near).zip(points.far) {
             *seen = near | *seen & far;
@@ -132,7 +155,7 @@ impl Mesh {
     }
 
     /// The same for the points in `which`, by single segments.
-    fn shadow_one_by_one(&self, apex: Vec3, points: &Points, which: &Lanes, seen: &mut Lanes) {
+    fn shadow_one_by_one(&self, apex: Vec3, points: &Ends, which: &Lanes, seen: &mut Lanes) {
         for (bundle, seen) in seen.iter_mut().enumerate() {
             for lane in bits(u32::from(*seen & which[bundle])) {
                 *seen &= !(u16::from(self.blocks(apex, points.point(bundle, lane))) << lane);
@@ -153,7 +176,8 @@ pub struct Scratch {
 /// One apex on its way through the hierarchy.
 struct Descent<'a> {
     mesh: &'a Mesh,
-    points: &'a Points,
+    starts: Option<&'a Starts>,
+    points: &'a Ends,
     apex: [f32; 3],
     scratch: &'a mut Scratch,
 }
@@ -165,14 +189,16 @@ impl Descent<'_> {
             return;
         }
         let root = [(0, u32::MAX)];
-        let Some(of_tile) = self.narrow::<I>(&root, self.points.tile, 0, seen) else { return };
+        let start = self.starts.map_or(0.0, |starts| starts.tile);
+        let Some(of_tile) = self.narrow::<I>(&root, (self.points.tile, start), 0, seen) else { return };
         for group in 0..BUNDLES / GROUP {
             let first = group * GROUP;
             let lanes = &mut seen[first..first + GROUP];
             if lanes.iter().all(|&l| l == 0) {
                 continue;
             }
-            let corners = self.points.groups[group];
+            let start = self.starts.map_or(0.0, |starts| starts.groups[group]);
+            let corners = (self.points.groups[group], start);
             let Some(of_group) = self.narrow::<I>(&of_tile, corners, first, lanes) else { continue };
             for (k, lanes) in lanes.iter_mut().enumerate() {
                 if *lanes != 0 {
@@ -182,17 +208,17 @@ impl Descent<'_> {
         }
     }
 
-    /// What of `from` the segments to the box `corners` may meet; `None` where nothing is left to ask for the bundles from
+    /// What of `from` the segments to the box `corners` may meet, from the share `start` on; `None` where nothing is left to ask for the bundles from
     /// `first` on, whose points are `seen`.
     #[inline(always)]
     fn narrow<I: Isa>(
         &mut self,
         from: &[(u32, u32)],
-        corners: Corners,
+        (corners, start): (Corners, f32),
         first: usize,
         seen: &mut [u16],
     ) -> Option<Candidates> {
-        let shaft = Shaft::new(self.apex, corners.0, corners.1);
+        let shaft = Shaft::new(self.apex, corners.0, corners.1).after(start);
         let mut open = Candidates::new();
         open.extend(from.iter().copied());
         let mut left = Candidates::new();
@@ -224,21 +250,27 @@ impl Descent<'_> {
         if blocks > FEW {
             return Some(left);
         }
-        self.test_few::<I>(&mut left, &shaft, first, seen).then_some(left)
+        self.test_few::<I>(&mut left, (&shaft, start), first, seen).then_some(left)
     }
 
     /// Tests the triangles of a few blocks for a whole tile or group: their planes are set up once, and asked of each group before
     /// each bundle. True where there are too many of them, and smaller shafts must go on with what is left of `few`.
     #[inline(always)]
-    fn test_few<I: Isa>(&mut self, few: &mut Candidates, shaft: &Shaft, first: usize, seen: &mut [u16]) -> bool {
+    fn test_few<I: Isa>(
+        &mut self,
+        few: &mut Candidates,
+        (shaft, start): (&Shaft, f32),
+        first: usize,
+        seen: &mut [u16],
+    ) -> bool {
         let mut asked: ArrayVec<(u32, u32), { FEW as usize }> = ArrayVec::new();
         let mut triangles = 0;
         for (number, boxes) in few.iter_mut() {
             let node = &self.mesh.bvh.nodes[*number as usize];
             for slot in bits(*boxes) {
                 let planes = self.planes::<I>(node, slot, shaft);
-                let against = planes.against(&shaft.directions);
                 let there = (1u32 << node.triangles[slot]) - 1;
+                let against = self.against(&planes, &shaft.directions, start);
                 if against.cover & there != 0 {
                     seen.fill(0);
                     return false;
@@ -272,9 +304,10 @@ impl Descent<'_> {
         }
         let (low, high) = self.points.groups[first / GROUP];
         let directions = Directions::between(self.apex, low, high);
+        let start = self.starts.map_or(0.0, |starts| starts.groups[first / GROUP]);
         let mut may: [u32; FEW as usize] = [0; FEW as usize];
         for (k, &(_, triangles)) in asked.iter().enumerate() {
-            let against = self.scratch.few[k].planes::<I>().against(&directions);
+            let against = self.against(&self.scratch.few[k].planes::<I>(), &directions, start);
             if against.cover & triangles != 0 {
                 return seen.fill(0);
             }
@@ -292,6 +325,16 @@ impl Descent<'_> {
                 }
             }
         }
+    }
+
+    /// All directions of a box against the triangles of a block, from the share `start` on; what covers a box may do so before that.
+    #[inline(always)]
+    fn against<I: Isa>(&self, planes: &Planes<I>, directions: &Directions, start: f32) -> Against {
+        let against = planes.against(directions);
+        if self.starts.is_none() {
+            return against;
+        }
+        Against { may: against.may & !planes.before_all(directions, start), cover: 0 }
     }
 
     #[inline(always)]
@@ -312,7 +355,11 @@ impl Descent<'_> {
         d: &[I::Sixteen; 3],
         seen: u16,
     ) -> u16 {
-        let decided = rows.test::<I>(lane, d);
+        let mut decided = rows.test::<I>(lane, d);
+        if let Some(starts) = self.starts {
+            let before = rows.before::<I>(lane, d, I::Sixteen::load(&starts.each[bundle]));
+            decided = Decided { miss: decided.miss | before, hit: decided.hit & !before };
+        }
         let seen = seen & !(decided.hit as u16);
         let undecided = seen & !(decided.miss as u16);
         if undecided == 0 { seen } else { self.ask_f64(block, lane, bundle, undecided, seen) }

@@ -158,7 +158,7 @@ impl Tile {
             depth,
             position: [column(&|r| r.position.x), column(&|r| r.position.y), column(&|r| r.position.z)],
             normal: [column(&|r| r.normal.x), column(&|r| r.normal.y), column(&|r| r.normal.z)],
-            lifted: Points::new(&scene.geometry, &lifted, usize::MAX),
+            lifted: Points::new(&scene.geometry, &lifted),
             varying: Varying::new(scene, &links),
             constant,
             links,

@@ -40,7 +40,7 @@ impl Neighbours {
         assert!(places.len() <= GROUP, "a group has {GROUP} receivers");
         let lift = |(position, normal): &(DVec3, DVec3)| scene.geometry.lift(*position, *normal).as_vec3();
         let lifted: Vec<Vec3> = places.iter().map(lift).collect();
-        Neighbours { lifted: Points::new(&scene.geometry, &lifted, usize::MAX), places, responses, bound }
+        Neighbours { lifted: Points::new(&scene.geometry, &lifted), places, responses, bound }
     }
 
     /// What the light reflected at the point `y`, which receiver number `own` has found, counts at each receiver:

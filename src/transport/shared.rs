@@ -196,7 +196,7 @@ pub fn of_lights(scene: &Scene, receivers: &[Receiver], asked: &[Asked]) -> Vec<
         return sums;
     }
     let lifted: Vec<Vec3> = receivers.iter().map(|r| scene.geometry.lift(r.position, r.normal).as_vec3()).collect();
-    let points = Points::new(&scene.geometry, &lifted, asked.len());
+    let points = Points::new(&scene.geometry, &lifted);
     for &(number, weight) in asked {
         let light = &scene.sources.lights[number];
         let arriving: Vec<_> = receivers.iter().map(|r| light.at(r.position)).collect();

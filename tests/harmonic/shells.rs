@@ -54,7 +54,7 @@ fn segments_are_blocked_as_by_the_series_alone() {
             for path in Path::ALL.into_iter().filter(|p| p.is_available()) {
                 geometry = geometry.with_path(path);
                 let mut seen: Lanes = [u16::MAX; BUNDLES];
-                geometry.hide(apex, &Points::new(&geometry, &points, 64), &mut seen, &mut Scratch::default());
+                geometry.hide(apex, &Points::new(&geometry, &points), &mut seen, &mut Scratch::default());
                 for (i, (&p, &expected)) in points.iter().zip(&expected).enumerate() {
                     assert_eq!(geometry.visible(apex, p), expected, "{name}: {apex} {p}");
                     let in_tile = seen[i / BUNDLE] >> (i % BUNDLE) & 1 == 1;

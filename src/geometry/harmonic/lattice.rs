@@ -16,11 +16,9 @@ impl Lattice {
 
     /// The lattice with `cells` cells along an edge.
     pub(super) fn new(cells: usize) -> Self {
-        let line = |i: usize| match i {
-            0 => -1.0,
-            i if i == cells => 1.0,
-            i => tan((2.0 * i as f64 / cells as f64 - 1.0) * 0.25 * PI),
-        };
+        // Those of both signs alike to the last bit, so that directions that mirror each other are.
+        let above = |i: usize| if i == cells { 1.0 } else { tan((2 * i - cells) as f64 / cells as f64 * 0.25 * PI) };
+        let line = |i: usize| if 2 * i < cells { -above(cells - i) } else { above(i) };
         Lattice { cells, lines: (0..=cells).map(line).collect() }
     }
 
@@ -44,6 +42,13 @@ impl Lattice {
                 (0..=n).step_by(step).map(move |k| [i, j, k])
             })
         })
+    }
+
+    /// The same for all points with the same z that others become by mirrors in x, y and x = y: their directions have the same z and
+    /// x^2 + y^2 to the last bit.
+    pub(super) fn round(&self, [i, j, k]: [usize; 3]) -> [usize; 3] {
+        let [a, b] = [i, j].map(|i| i.max(self.cells - i));
+        [a.max(b), a.min(b), k]
     }
 
     /// The direction of such a point.

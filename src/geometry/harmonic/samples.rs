@@ -2,8 +2,7 @@
 //! faster than the sum of the series.
 //!
 //! Let v be a point of the lattice, w = n - (n,v) v the way from it to a direction n, a the angle between them, and P the rotation
-//! that takes v to n. In a frame that goes with it along the great circle the second derivatives H are trigonometric polynomials of degree N and
-//! at most M2, so none changes faster than M3 = N M2 (Bernstein), and
+//! that takes v to n. With a bound M3 of all third derivatives around v (`regions`), in a frame that goes with it along the great circle,
 //!
 //! ```text
 //! |r(n)      - (r + a (g,w/|w|) + a^2 w'Hw/(2 |w|^2))|  <=  M3 a^3/6
@@ -14,17 +13,20 @@
 use super::Bounds;
 use super::bounds::{hessian, sup};
 use super::lattice::Lattice;
-use super::series::Series;
+use super::regions::{Regions, Shape, Steepness, carried};
+use super::series::{Bend, Series};
 use super::steps::Taylor;
 use crate::math::{DMat3, DVec3};
 use rayon::prelude::*;
 
 /// Cells along an edge of the cube come in so many.
-pub(super) const CELLS: usize = 48;
+const CELLS: usize = 48;
 /// Degrees for which these are enough: N a = 0.19 at most.
 const DEGREES: usize = 8;
 /// Times that, at most.
 const MOST: usize = 4;
+/// Points whose derivatives are found by one thread in one go.
+const TOGETHER: usize = 1024;
 /// What f32 rounds, and the expansion of an angle, of the largest numbers of their kind.
 const ROUNDING: f64 = 4e-7;
 
@@ -35,8 +37,7 @@ pub(super) struct Samples {
     /// Face by face, u by u.
     all: Vec<Sample>,
     bounds: Bounds,
-    /// M3.
-    third: f64,
+    regions: Regions,
 }
 
 /// Value, gradient and covariant second derivatives in a direction.
@@ -52,15 +53,15 @@ impl Samples {
     /// The samples of `series`.
     pub(super) fn new(series: &Series) -> Samples {
         let lattice = Lattice::new(CELLS * series.degree().div_ceil(DEGREES).clamp(1, MOST));
-        let side = lattice.cells() + 1;
-        let at = |k: usize| {
-            let n = lattice.direction(lattice.on_face([k / (side * side), k / side % side, k % side]));
-            (n, series.bend(n))
-        };
-        let bends: Vec<_> = (0..6 * side * side).into_par_iter().map(at).collect();
+        let bends = bends(series, &lattice);
         let bounds = sup(series, &bends, lattice.reach());
+        let shapes: Vec<Shape> = bends.par_iter().map(|(n, bend)| Shape::new(*n, bend)).collect();
+        let degree = series.degree();
+        let whole = Steepness { first: bounds.first, second: bounds.second, third: degree as f64 * bounds.second };
+        let regions = Regions::new(&lattice, &shapes, degree, whole);
+        let bounds = Bounds { third: bounds.third.min(regions.third()), ..bounds };
         let single = |x: f64| x as f32;
-        let sample = |(n, bend): &(DVec3, super::Bend)| {
+        let sample = |(n, bend): &(DVec3, Bend)| {
             let [x, y, z] = hessian(bend, *n).to_cols_array_2d();
             Sample {
                 value: single(bend.value),
@@ -68,8 +69,7 @@ impl Samples {
                 hessian: [x[0], y[1], z[2], y[2], x[2], x[1]].map(single),
             }
         };
-        let third = series.degree() as f64 * bounds.second;
-        Samples { all: bends.iter().map(sample).collect(), lattice, bounds, third }
+        Samples { all: bends.iter().map(sample).collect(), lattice, bounds, regions }
     }
 
     /// Bounds of the series and its derivatives.
@@ -77,36 +77,29 @@ impl Samples {
         self.bounds
     }
 
-    /// Cells along an edge of the cube.
-    pub(super) fn cells(&self) -> usize {
-        self.lattice.cells()
-    }
-
-    /// The point of the surface in the direction of the point (u, v) of a face of the lattice.
-    pub(super) fn corner(&self, face: usize, u: usize, v: usize) -> DVec3 {
-        let side = self.lattice.cells() + 1;
-        let value = f64::from(self.all[(face * side + u) * side + v].value);
-        value * self.lattice.direction(self.lattice.on_face([face, u, v]))
+    /// The sine of the angle as far as which what is said around a direction holds.
+    pub(super) fn reach(&self) -> f64 {
+        self.regions.reach()
     }
 
     /// Memory \[bytes\].
     pub(super) fn bytes(&self) -> u64 {
-        size_of_val(&self.all[..]) as u64
+        size_of_val(&self.all[..]) as u64 + self.regions.bytes()
     }
 
     /// r in the direction of `n`, and how wrong it may be.
     pub(super) fn value(&self, n: DVec3) -> (f64, f64) {
-        let (sample, v) = self.beside(n);
+        let Near { sample, v, around } = self.beside(n);
         let (w, angle) = way(v, n);
         let (gradient, hessian) = sample.derivatives();
-        (f64::from(sample.value) + w.dot(gradient + 0.5 * (hessian * w)), self.error_of_value(angle))
+        (f64::from(sample.value) + w.dot(gradient + 0.5 * (hessian * w)), self.error_of_value(around, angle))
     }
 
-    /// F and its derivatives at `x` along the unit vector `d`, and how wrong each may be.
-    pub(super) fn height(&self, x: DVec3, d: DVec3) -> (Taylor, Taylor) {
+    /// F and its derivatives at `x` along the unit vector `d`, how wrong each may be, and what holds around there.
+    pub(super) fn height(&self, x: DVec3, d: DVec3) -> (Taylor, Taylor, &Steepness) {
         let length = x.length();
         let n = x / length;
-        let (sample, v) = self.beside(n);
+        let Near { sample, v, around } = self.beside(n);
         let (w, angle) = way(v, n);
         let (gradient, hessian) = sample.derivatives();
         let bent = hessian * w;
@@ -123,26 +116,80 @@ impl Samples {
             first: c - slope / length,
             second: (sine_squared - (bend - 2.0 * c * slope) / length) / length,
         };
+        (height, self.errors(around, angle, length), around)
+    }
+
+    /// The shape of the surface in the direction `n`.
+    pub(super) fn look(&self, n: DVec3) -> Look<'_> {
+        let Near { sample, v, around } = self.beside(n);
+        let (w, angle) = way(v, n);
+        let (gradient, hessian) = sample.derivatives();
+        let bent = hessian * w;
+        let slope = gradient + bent;
+        Look {
+            value: f64::from(sample.value) + w.dot(gradient + 0.5 * bent),
+            gradient: slope - slope.dot(n) / (1.0 + n.dot(v)) * (v + n),
+            hessian: carried(v, n, hessian),
+            errors: self.errors(around, angle, 1.0),
+            around,
+        }
+    }
+
+    /// How wrong F and its derivatives may be at the angle `angle` from a sample, `length` from the centre.
+    fn errors(&self, around: &Steepness, angle: f64, length: f64) -> Taylor {
         let Bounds { first, second, .. } = self.bounds;
-        let of_slope = 0.5 * self.third * angle * angle + ROUNDING * (first + second);
-        let errors = Taylor {
-            value: self.error_of_value(angle),
+        let of_slope = 0.5 * around.third * angle * angle + ROUNDING * (first + second);
+        Taylor {
+            value: self.error_of_value(around, angle),
             first: of_slope / length,
-            second: (self.third * angle + ROUNDING * second + 2.0 * of_slope) / (length * length),
-        };
-        (height, errors)
+            second: (around.third * angle + ROUNDING * second + 2.0 * of_slope) / (length * length),
+        }
     }
 
-    fn error_of_value(&self, angle: f64) -> f64 {
-        self.third * angle * angle * angle / 6.0 + ROUNDING * (self.bounds.high + self.bounds.first)
+    fn error_of_value(&self, around: &Steepness, angle: f64) -> f64 {
+        around.third * angle * angle * angle / 6.0 + ROUNDING * (self.bounds.high + self.bounds.first)
     }
 
-    /// A sample beside the direction `n`, and its direction.
-    fn beside(&self, n: DVec3) -> (&Sample, DVec3) {
-        let [face, u, v] = self.lattice.beside(n);
-        let side = self.lattice.cells() + 1;
-        (&self.all[(face * side + u) * side + v], self.lattice.direction(self.lattice.on_face([face, u, v])))
+    /// A sample beside the direction `n`.
+    fn beside(&self, n: DVec3) -> Near<'_> {
+        let at = self.lattice.beside(n);
+        let (side, [face, u, v]) = (self.lattice.cells() + 1, at);
+        let around = self.regions.around(at, self.lattice.cells());
+        let sample = &self.all[(face * side + u) * side + v];
+        Near { sample, v: self.lattice.direction(self.lattice.on_face(at)), around }
     }
+}
+
+/// A sample, its direction, and what holds around it.
+struct Near<'a> {
+    sample: &'a Sample,
+    v: DVec3,
+    around: &'a Steepness,
+}
+
+/// What samples say of a series in a direction.
+pub(super) struct Look<'a> {
+    pub(super) value: f64,
+    /// On the sphere.
+    pub(super) gradient: DVec3,
+    /// On the sphere.
+    pub(super) hessian: DMat3,
+    /// How wrong each may be, the second times what a unit vector across makes of it at the distance 1.
+    pub(super) errors: Taylor,
+    pub(super) around: &'a Steepness,
+}
+
+/// The derivatives of `series` at the points of `lattice`, face by face, with their directions; those that can be are found together.
+fn bends(series: &Series, lattice: &Lattice) -> Vec<(DVec3, Bend)> {
+    let side = lattice.cells() + 1;
+    let point = |k: usize| lattice.on_face([k / (side * side), k / side % side, k % side]);
+    let mut order: Vec<usize> = (0..6 * side * side).collect();
+    order.par_sort_unstable_by_key(|&k| (lattice.round(point(k)), k));
+    let directions: Vec<DVec3> = order.par_iter().map(|&k| lattice.direction(point(k))).collect();
+    let all: Vec<Vec<Bend>> = directions.par_chunks(TOGETHER).map(|some| series.bends(some)).collect();
+    let mut bends: Vec<_> = order.into_iter().zip(directions.into_iter().zip(all.into_iter().flatten())).collect();
+    bends.par_sort_unstable_by_key(|(k, _)| *k);
+    bends.into_iter().map(|(_, of)| of).collect()
 }
 
 impl Sample {

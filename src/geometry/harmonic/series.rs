@@ -24,7 +24,8 @@
 
 use crate::error::{Error, Result};
 use crate::geometry::simd::{Isa, Kernel, Path};
-use crate::math::{DMat3, DVec3, PI, gauss_legendre, sin_cos};
+use crate::math::{DMat3, DVec3};
+use std::ops::RangeInclusive;
 
 /// The largest degree N.
 pub const MAX_DEGREE: usize = 128;
@@ -34,14 +35,14 @@ pub const MAX_DEGREE: usize = 128;
 pub struct Series {
     degree: usize,
     /// Orders one after the other, degrees k = m ..= N in each.
-    terms: Vec<Term>,
+    pub(super) terms: Vec<Term>,
     /// The same, [`LANES`] orders side by side.
     groups: Vec<Vec<Row>>,
     path: Path,
 }
 
-/// Orders that are summed side by side: two registers of AVX-512, so that one waits less for the other.
-const LANES: usize = 16;
+/// Orders that are summed side by side: two registers of AVX2, so that one waits less for the other, and sums stay in registers.
+const LANES: usize = 8;
 
 /// Terms with the same k - m of neighbouring orders m; 0 beyond the degree of the series.
 #[derive(Clone, Debug, PartialEq)]
@@ -54,12 +55,12 @@ struct Row {
 
 /// A pair of coefficients and the recurrence that leads to its function.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Term {
+pub(super) struct Term {
     cosine: f64,
     sine: f64,
     /// H_k = `ahead` z H_(k-1) - `behind` H_(k-2); `ahead` of k = m is H_m^m itself.
-    ahead: f64,
-    behind: f64,
+    pub(super) ahead: f64,
+    pub(super) behind: f64,
 }
 
 /// Value and gradient in a direction.
@@ -90,7 +91,7 @@ impl Bend {
 }
 
 /// Coefficients of degree k and order m stand at `index(k, m)`: degree after degree, orders in each.
-fn index(k: usize, m: usize) -> usize {
+pub(super) fn index(k: usize, m: usize) -> usize {
     k * (k + 1) / 2 + m
 }
 
@@ -159,7 +160,7 @@ impl Series {
         Series::new(&self.pairs()[..index(degree + 1, 0)]).expect("coefficients of a series")
     }
 
-    fn for_each(&self, mut f: impl FnMut(usize, usize, &Term)) {
+    pub(super) fn for_each(&self, mut f: impl FnMut(usize, usize, &Term)) {
         let mut terms = self.terms.iter();
         for m in 0..=self.degree {
             for (k, term) in (m..=self.degree).zip(terms.by_ref()) {
@@ -182,6 +183,13 @@ impl Series {
     /// r, g and the second derivatives in the direction of the unit vector `n`.
     pub fn bend(&self, n: DVec3) -> Bend {
         self.path.run(At::<2> { series: self, n })
+    }
+
+    /// The same in each of `directions`: faster where some that follow each other have the same z and x^2 + y^2 to the last bit.
+    pub(super) fn bends(&self, directions: &[DVec3]) -> Vec<Bend> {
+        let alike = |a: &DVec3, b: &DVec3| a.z == b.z && a.x * a.x + a.y * a.y == b.x * b.x + b.y * b.y;
+        let rounds = directions.chunk_by(alike);
+        rounds.flat_map(|directions| self.path.run(Round { series: self, directions })).collect()
     }
 
     /// The norm |c_k| of the coefficients of each degree: sqrt(sum over m of c^2 + s^2), which bounds that part of r everywhere.
@@ -224,38 +232,90 @@ impl<const DERIVATIVES: u32> Kernel for At<'_, DERIVATIVES> {
 
     #[inline(always)]
     fn run<I: Isa>(self) -> Bend {
-        let n = self.n;
-        let (mut value, mut g) = (0.0, DVec3::ZERO);
-        let [mut xx, mut xy, mut xz, mut yz, mut zz] = [0.0; 5];
-        // (x + i y)^m, and the same with m - 1 and m - 2.
-        let (mut power, mut before, mut second) = ([1.0, 0.0], [0.0; 2], [0.0; 2]);
-        let mut orders = 0..=self.series.degree;
-        for group in &self.series.groups {
-            let of = sums::<DERIVATIVES>(group, n);
-            for (lane, m) in (0..LANES).zip(orders.by_ref()) {
-                let [a, b, da, db, dda, ddb] = of.map(|lanes| lanes[lane]);
-                let order = m as f64;
-                value += a * power[0] + b * power[1];
-                if DERIVATIVES >= 1 {
-                    g.x += order * (a * before[0] + b * before[1]);
-                    g.y += order * (b * before[0] - a * before[1]);
-                    g.z += da * power[0] + db * power[1];
-                }
-                if DERIVATIVES >= 2 {
-                    let pairs = order * (order - 1.0);
-                    xx += pairs * (a * second[0] + b * second[1]);
-                    xy += pairs * (b * second[0] - a * second[1]);
-                    xz += order * (da * before[0] + db * before[1]);
-                    yz += order * (db * before[0] - da * before[1]);
-                    zz += dda * power[0] + ddb * power[1];
-                }
-                (second, before) = (before, power);
-                power = [power[0] * n.x - power[1] * n.y, power[0] * n.y + power[1] * n.x];
+        let mut sum = Sum::new(self.n);
+        for (group, first) in self.series.groups.iter().zip((0..).step_by(LANES)) {
+            let of = sums::<DERIVATIVES>(group, self.n);
+            sum.add::<DERIVATIVES>(&of, first..=self.series.degree);
+        }
+        sum.bend()
+    }
+}
+
+/// A series in directions with the same z, and the same x^2 + y^2 to the last bit, which share what does not depend on x and y.
+struct Round<'a> {
+    series: &'a Series,
+    directions: &'a [DVec3],
+}
+
+impl Kernel for Round<'_> {
+    type Output = Vec<Bend>;
+
+    #[inline(always)]
+    fn run<I: Isa>(self) -> Vec<Bend> {
+        let mut all = Vec::with_capacity(self.directions.len());
+        for n in self.directions {
+            all.push(Sum::new(*n));
+        }
+        for (group, first) in self.series.groups.iter().zip((0..).step_by(LANES)) {
+            let of = sums::<2>(group, self.directions[0]);
+            for sum in &mut all {
+                sum.add::<2>(&of, first..=self.series.degree);
             }
         }
+        all.iter().map(Sum::bend).collect()
+    }
+}
+
+/// The sum of orders in a direction.
+struct Sum {
+    n: DVec3,
+    value: f64,
+    g: DVec3,
+    /// xx, xy, xz, yz, zz.
+    second: [f64; 5],
+    /// (x + i y)^m, and the same with m - 1 and m - 2.
+    powers: [[f64; 2]; 3],
+}
+
+impl Sum {
+    #[inline(always)]
+    fn new(n: DVec3) -> Sum {
+        Sum { n, value: 0.0, g: DVec3::ZERO, second: [0.0; 5], powers: [[1.0, 0.0], [0.0; 2], [0.0; 2]] }
+    }
+
+    /// Adds the orders of a group, as far as there are any.
+    #[inline(always)]
+    fn add<const DERIVATIVES: u32>(&mut self, of: &[[f64; LANES]; 6], orders: RangeInclusive<usize>) {
+        let Sum { n, value, g, second: [xx, xy, xz, yz, zz], powers: [power, before, second] } = self;
+        for (lane, m) in (0..LANES).zip(orders) {
+            let [a, b, da, db, dda, ddb] =
+                [of[0][lane], of[1][lane], of[2][lane], of[3][lane], of[4][lane], of[5][lane]];
+            let order = m as f64;
+            *value += a * power[0] + b * power[1];
+            if DERIVATIVES >= 1 {
+                g.x += order * (a * before[0] + b * before[1]);
+                g.y += order * (b * before[0] - a * before[1]);
+                g.z += da * power[0] + db * power[1];
+            }
+            if DERIVATIVES >= 2 {
+                let pairs = order * (order - 1.0);
+                *xx += pairs * (a * second[0] + b * second[1]);
+                *xy += pairs * (b * second[0] - a * second[1]);
+                *xz += order * (da * before[0] + db * before[1]);
+                *yz += order * (db * before[0] - da * before[1]);
+                *zz += dda * power[0] + ddb * power[1];
+            }
+            (*second, *before) = (*before, *power);
+            *power = [power[0] * n.x - power[1] * n.y, power[0] * n.y + power[1] * n.x];
+        }
+    }
+
+    #[inline(always)]
+    fn bend(&self) -> Bend {
+        let [xx, xy, xz, yz, zz] = self.second;
         // The powers are harmonic in x and y.
         let hessian = DMat3::from_cols_array(&[xx, xy, xz, xy, -xx, yz, xz, yz, zz]);
-        Bend { value, g, hessian }
+        Bend { value: self.value, g: self.g, hessian }
     }
 }
 
@@ -291,64 +351,4 @@ fn sums<const DERIVATIVES: u32>(group: &[Row], n: DVec3) -> [[f64; LANES]; 6] {
         }
     }
     [a, b, da, db, dda, ddb]
-}
-
-/// All functions up to `degree` in the direction of the unit vector `n`: the pairs S_k^m cos m phi, S_k^m sin m phi, degree
-/// after degree, orders m = 0 ..= k in each.
-pub fn basis(degree: usize, n: DVec3) -> Vec<[f64; 2]> {
-    let unit = Series::new(&vec![[0.0; 2]; index(degree + 1, 0)]).expect("zeros up to a degree");
-    let mut functions = vec![[0.0; 2]; unit.terms.len()];
-    let (mut re, mut im) = (1.0, 0.0);
-    let (mut h, mut previous) = (0.0, 0.0);
-    let across2 = n.x * n.x + n.y * n.y;
-    unit.for_each(|k, m, term| {
-        if k == m {
-            if m > 0 {
-                (re, im) = (re * n.x - im * n.y, re * n.y + im * n.x);
-            }
-            (h, previous) = (term.ahead, 0.0);
-        } else {
-            let next = n.z * (term.ahead * h - term.behind * (n.z * previous)) - term.behind * (across2 * previous);
-            (h, previous) = (next, h);
-        }
-        functions[index(k, m)] = [h * re, h * im];
-    });
-    functions
-}
-
-/// The coefficients of a function of direction: c_km = (2k+1)/(4 pi) int r S_k^m cos m phi dw, s_km with sin.
-///
-/// Gauss-Legendre in z with `nodes` nodes and twice as many equal steps of the azimuth; `of` is given all directions at once.
-/// Exact for series up to degree `nodes` - 1 - `degree`/2; 2(N + 1) nodes remove aliasing.
-///
-/// # Errors
-/// Those of `of`, and of [`Series::new`] for values that are not finite.
-pub fn projection(degree: usize, nodes: usize, of: impl FnOnce(&[DVec3]) -> Result<Vec<f64>>) -> Result<Series> {
-    let rule = gauss_legendre(nodes);
-    let steps = 2 * nodes;
-    let mut directions = Vec::with_capacity(nodes * steps);
-    for &(z, _) in &rule {
-        let across = (1.0 - z * z).max(0.0).sqrt();
-        directions.extend((0..steps).map(|j| {
-            let (sin, cos) = sin_cos(2.0 * PI * (j as f64 + 0.5) / steps as f64);
-            DVec3::new(across * cos, across * sin, z)
-        }));
-    }
-    let values = of(&directions)?;
-    let mut pairs = vec![[0.0; 2]; index(degree + 1, 0)];
-    for (i, (&n, value)) in directions.iter().zip(values).enumerate() {
-        // 4 pi is the sum of the weights: 2 of the rule, 2 pi of the azimuth.
-        let weight = value * rule[i / steps].1 * 0.5 / steps as f64;
-        for (pair, function) in pairs.iter_mut().zip(basis(degree, n)) {
-            pair[0] += weight * function[0];
-            pair[1] += weight * function[1];
-        }
-    }
-    for k in 0..=degree {
-        for m in 0..=k {
-            pairs[index(k, m)] = pairs[index(k, m)].map(|c| c * (2 * k + 1) as f64);
-        }
-        pairs[index(k, 0)][1] = 0.0;
-    }
-    Series::new(&pairs)
 }

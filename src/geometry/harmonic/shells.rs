@@ -11,11 +11,10 @@ use super::Star;
 use super::bounds::Bounds;
 use super::lattice::Lattice;
 use crate::math::DVec3;
+use rayon::prelude::*;
 
-/// Cells of the meshes along an edge of the cube.
-const CELLS: usize = 24;
-/// Parts of an edge between samples of a triangle.
-const PARTS: usize = 8;
+/// Samples along an edge of the cube.
+const SAMPLES: usize = 384;
 
 /// Corners of triangles inside and outside of a surface, in its own coordinates.
 pub(super) struct Shells {
@@ -28,17 +27,18 @@ pub(super) struct Shells {
 }
 
 impl Shells {
-    /// The shells of `star`, farther from it by the share `margin` than they need be.
-    pub(super) fn new(star: &Star, margin: f64) -> Shells {
-        let lattice = Lattice::new(CELLS);
+    /// The shells of `star` with so many `cells` along an edge of the cube, farther from it by the share `margin` than they need be.
+    pub(super) fn new(star: &Star, cells: usize, margin: f64) -> Shells {
+        let lattice = Lattice::new(cells);
         let points: Vec<[usize; 3]> = lattice.points().collect();
         let number = |p: [usize; 3]| points.binary_search(&p).expect("a point of the lattice");
         let corners: Vec<DVec3> =
             points.iter().map(|&p| lattice.direction(p)).map(|n| star.series.value(n) * n).collect();
         let triangles: Vec<[usize; 3]> = triangles(&lattice).map(|t| t.map(number)).collect();
+        let bounds: Vec<(f64, f64)> =
+            triangles.par_iter().map(|t| quotients(star, &t.map(|i| corners[i]), SAMPLES / cells)).collect();
         let mut factors = vec![(f64::INFINITY, 0f64); corners.len()];
-        for triangle in &triangles {
-            let (low, high) = quotients(star, &triangle.map(|i| corners[i]));
+        for (triangle, &(low, high)) in triangles.iter().zip(&bounds) {
             for &i in triangle {
                 factors[i] = (factors[i].0.min(low), factors[i].1.max(high));
             }
@@ -57,8 +57,9 @@ impl Shells {
 
 /// Two triangles for each cell of the faces of the cube, their fronts outward.
 fn triangles(lattice: &Lattice) -> impl Iterator<Item = [[usize; 3]; 3]> {
+    let n = lattice.cells();
     (0..6).flat_map(move |face| {
-        let cells = (0..CELLS).flat_map(|u| (0..CELLS).map(move |v| (u, v)));
+        let cells = (0..n).flat_map(move |u| (0..n).map(move |v| (u, v)));
         cells.flat_map(move |(u, v)| {
             let corner = |du: usize, dv: usize| lattice.on_face([face, u + du, v + dv]);
             let turned = [corner(0, 1), corner(1, 0)];
@@ -68,20 +69,20 @@ fn triangles(lattice: &Lattice) -> impl Iterator<Item = [[usize; 3]; 3]> {
     })
 }
 
-/// Bounds of q over a triangle with its corners on the surface.
-fn quotients(star: &Star, corners: &[DVec3; 3]) -> (f64, f64) {
+/// Bounds of q over a triangle with its corners on the surface, by so many `parts` of its edges.
+fn quotients(star: &Star, corners: &[DVec3; 3], parts: usize) -> (f64, f64) {
     let [a, b, c] = *corners;
     let longest = (b - a).length().max((c - b).length()).max((a - c).length());
     let plane = (b - a).cross(c - a).normalize_or_zero().dot(a).abs();
     let nearest = plane.max(a.length().min(b.length()).min(c.length()) - longest);
     let Bounds { first, second, .. } = star.bounds;
     let bend = (second + 3.0 * first + 2.0 * star.bounds.high) / (nearest * nearest * nearest);
-    let edge = longest / PARTS as f64;
+    let edge = longest / parts as f64;
     let slack = bend * edge * edge / 6.0;
     let (mut low, mut high) = (f64::INFINITY, 0f64);
-    for i in 0..=PARTS {
-        for j in 0..=PARTS - i {
-            let [u, v] = [i, j].map(|x| x as f64 / PARTS as f64);
+    for i in 0..=parts {
+        for j in 0..=parts - i {
+            let [u, v] = [i, j].map(|x| x as f64 / parts as f64);
             let y = a + u * (b - a) + v * (c - a);
             let length = y.length();
             let (value, error) = star.samples.value(y / length);

@@ -7,7 +7,7 @@ use super::super::bvh::{Node, WIDTH};
 use super::super::mesh::bits;
 use super::super::planes::Planes;
 use super::super::shaft::{Bundle, Shaft};
-use super::super::simd::{Isa, prefetch};
+use super::super::simd::{Isa, Vector, prefetch};
 use super::Descent;
 use crate::math::Vec3;
 use arrayvec::ArrayVec;
@@ -41,9 +41,13 @@ impl Descent<'_> {
     #[inline(always)]
     pub(super) fn bundle<I: Isa>(&mut self, from: &[(u32, u32)], number: usize, seen: u16) -> u16 {
         let (low, high) = self.points.bundles[number];
-        let shaft = Shaft::new(self.apex, low, high);
+        let mut shaft = Shaft::new(self.apex, low, high);
         let d = self.points.segments::<I>(number, self.apex);
-        let boxes = Bundle::new(&shaft, &d);
+        let mut boxes = Bundle::new(&shaft, &d);
+        if let Some(starts) = self.starts {
+            shaft = shaft.after(starts.bundles[number]);
+            boxes = boxes.after(I::Sixteen::load(&starts.each[number]));
+        }
         let segments = Segments::<I> { number, shaft, d, boxes };
         let mut seen = u32::from(seen);
         let mut open = Stack::new();
@@ -101,7 +105,8 @@ impl Descent<'_> {
         if alive.count_ones() <= FEW {
             return seen & !self.blocked(&planes, block, there, segments.number, alive);
         }
-        let against = planes.against(&segments.shaft.directions);
+        let start = self.starts.map_or(0.0, |starts| starts.bundles[segments.number]);
+        let against = self.against(&planes, &segments.shaft.directions, start);
         if against.cover & there != 0 {
             return 0;
         }
@@ -127,8 +132,12 @@ impl Descent<'_> {
         for lane in bits(alive) {
             let d = (self.points.point(bundle, lane) - Vec3::from(self.apex)).to_array();
             let decided = planes.test(d);
-            let undecided = there & !decided.miss;
-            if decided.hit & there != 0 || undecided != 0 && self.crosses_f64(block, undecided, d) {
+            let before = match self.starts {
+                Some(starts) => planes.before(d, starts.each[bundle][lane]),
+                None => 0,
+            };
+            let undecided = there & !(decided.miss | before);
+            if decided.hit & undecided != 0 || undecided != 0 && self.crosses_f64(block, undecided, d) {
                 blocked |= 1 << lane;
             }
         }

@@ -1,0 +1,290 @@
+//! Rays and segments in the world against a star-shaped object: meshes first, the series for what is left.
+//!
+//! Between two points outside: what crosses the inner mesh is blocked; what does not cross the outer one, where an end is certainly outside of that
+//! too, is free. A point just outside of the surface stands within the outer mesh, and nearly every segment from there would cross it. So
+//! its end is moved along the segment first, as far as that is certainly clear (`rise`). A way that is moved off by rounding stays within
+//! the room that the meshes leave.
+
+use super::Crossing;
+use super::beside::{TileBeside, shares};
+use super::placed::{Harmonic, Pair};
+use crate::geometry::mesh::bits;
+use crate::geometry::points::Ends;
+use crate::geometry::visibility::{BUNDLE, BUNDLES, Lanes, Points, Scratch, Starts};
+use crate::geometry::{Hit, Ray, hit};
+use crate::math::{DVec3, Vec3};
+use std::ops::Range;
+
+/// What an end that is moved may be off, in units of its largest coordinate.
+const ROUNDING: f64 = 1e-6;
+
+/// A segment between two points outside of an object, and the part of it that is left where it is clear from its ends on.
+#[derive(Clone, Copy)]
+struct Segment {
+    whole: [Vec3; 2],
+    part: [Vec3; 2],
+    /// Whether the ends may be within the outer mesh.
+    near: [bool; 2],
+}
+
+/// A crossing in the coordinates of an object, looked for from `before` on \[m\], with lengths `scale` times those of the world.
+struct Line {
+    crossing: Crossing,
+    before: f64,
+    scale: f64,
+}
+
+impl Harmonic {
+    /// Clears the bits of the points in `seen` that `apex` does not see for this object, `beside` which they are.
+    pub(in crate::geometry) fn hide(
+        &self,
+        apex: Vec3,
+        points: &Points,
+        beside: &TileBeside,
+        seen: &mut Lanes,
+        scratch: &mut Scratch,
+    ) {
+        let here = self.beside(apex.as_dvec3());
+        for (seen, inside) in seen.iter_mut().zip(&beside.inside) {
+            *seen &= if here.inside { *inside } else { !inside };
+        }
+        if *seen == [0; BUNDLES] {
+            return;
+        }
+        let Some(shells) = self.shells.as_ref().filter(|_| !here.inside) else {
+            let whole = |bundle, lane| [apex, points.point(bundle, lane)];
+            return clear_bits(seen, *seen, |bundle, lane| self.crosses(&Segment::inside(whole(bundle, lane))));
+        };
+        let (path, fine) = (shells.fine.outer.path, &shells.fine);
+        let moved = beside.towards(path, apex, &points.ends, seen);
+        let ends = moved.as_ref().unwrap_or(&points.ends);
+        if here.far && moved.is_none() {
+            let (free, open) = shells.coarse.decide((apex, None), ends, seen, scratch);
+            *seen = open;
+            if open != [0; BUNDLES] {
+                let (free_too, open) = fine.decide((apex, None), ends, seen, scratch);
+                *seen = joined(&free_too, &open, |free, open| free | open);
+                let whole = |bundle, lane| [apex, points.point(bundle, lane)];
+                let segment = |whole| Segment { whole, part: whole, near: [false; 2] };
+                clear_bits(seen, open, |bundle, lane| self.crosses(&segment(whole(bundle, lane))));
+            }
+            *seen = joined(seen, &free, |seen, free| seen | free);
+            return;
+        }
+        let shares = shares(path, &here, apex, ends, seen);
+        let segment = |bundle: usize, lane: usize| {
+            let to = ends.point(bundle, lane);
+            let from = apex + shares.as_ref().map_or(0.0, |shares| shares[bundle][lane]) * (to - apex);
+            let whole = [apex, points.point(bundle, lane)];
+            Segment { whole, part: [from, to], near: [here.near, beside.near[bundle] >> lane & 1 == 1] }
+        };
+        let slow = shares.as_ref().map_or([0; BUNDLES], |shares| below_half(shares, seen));
+        let fast = joined(seen, &slow, |seen, slow| seen & !slow);
+        let starts = shares.map(|shares| Starts::new(shares, &fast));
+        let (mut free, open) = fine.decide((apex, starts.as_ref()), ends, &fast, scratch);
+        if here.near {
+            let asked = joined(&free, &beside.near, |free, near| free & near);
+            clear_bits(&mut free, asked, |bundle, lane| {
+                let segment = segment(bundle, lane);
+                self.is_within(&segment) && self.crosses(&segment)
+            });
+        }
+        *seen = joined(&free, &slow, |free, slow| free | slow);
+        clear_bits(seen, slow, |bundle, lane| self.is_crossed(fine, &segment(bundle, lane)));
+        *seen = joined(seen, &open, |seen, open| seen | open);
+        clear_bits(seen, open, |bundle, lane| self.crosses(&segment(bundle, lane)));
+    }
+
+    /// True when the segment between `a` and `b` crosses the surface \[m\].
+    pub(in crate::geometry) fn blocks(&self, a: Vec3, b: Vec3) -> bool {
+        let sides = [self.beside(a.as_dvec3()), self.beside(b.as_dvec3())];
+        if sides[0].inside != sides[1].inside {
+            return true;
+        }
+        match &self.shells {
+            Some(shells) if !sides[0].inside => {
+                let to = b + sides[1].clear(a - b) * (a - b);
+                let from = a + sides[0].clear(to - a) * (to - a);
+                let segment = Segment { whole: [a, b], part: [from, to], near: sides.map(|side| side.near) };
+                self.is_crossed(&shells.fine, &segment)
+            }
+            _ => self.crosses(&Segment::inside([a, b])),
+        }
+    }
+
+    /// True when a segment crosses the surface.
+    fn is_crossed(&self, shells: &Pair, segment: &Segment) -> bool {
+        let Segment { part: [from, to], near, .. } = *segment;
+        if !shells.outer.blocks(from, to) && !(near == [true; 2] && self.is_within(segment)) {
+            return false;
+        }
+        shells.inner.blocks(from, to) || self.crosses(segment)
+    }
+
+    /// True where both ends of what is left of a segment may be within the outer mesh: without crossing that they may see each other through the
+    /// surface.
+    fn is_within(&self, segment: &Segment) -> bool {
+        segment.part.iter().all(|p| self.beside(p.as_dvec3()).near)
+    }
+
+    /// The same by the series, wherever the segment is inside the outer mesh.
+    fn crosses(&self, segment: &Segment) -> bool {
+        let [a, b] = segment.whole.map(|p| p.as_dvec3());
+        let whole = (b - a).length();
+        if whole == 0.0 {
+            return false;
+        }
+        let ray = Ray { origin: a, direction: (b - a) / whole };
+        let [from, to] = segment.part.map(|p| (p.as_dvec3() - a).dot(ray.direction));
+        let off = ROUNDING * a.abs().max(b.abs()).max_element();
+        self.first_within(&ray, (from - off).max(0.0)..(to + off).min(whole), segment.near).is_some()
+    }
+
+    /// The first point of the surface along `ray`, at most `limit` away \[m\].
+    pub(in crate::geometry) fn hit(&self, ray: &Ray, limit: f64) -> Option<Hit> {
+        if !self.passes(ray, limit) {
+            return None;
+        }
+        let here = self.beside(ray.origin);
+        let around = limit.min(2.0 * self.around().1);
+        let clear = f64::from(here.clear((around * ray.direction).as_vec3())) * around;
+        let line = self.first_within(ray, clear..limit, [here.near, limit < f64::INFINITY])?;
+        Some(self.met(ray, &line))
+    }
+
+    /// The same of many rays, each up to its entry of `hits`, which it replaces as the surface `primitive`: rays from one point ask the outer mesh
+    /// together.
+    pub(in crate::geometry) fn hits(&self, rays: &[Ray], hits: &mut [Option<Hit>], primitive: u32) {
+        let mut entries = vec![None; rays.len()];
+        if let Some(shells) = &self.shells {
+            shells.fine.outer.closest_hits(rays, &mut entries);
+        }
+        let mut start: Option<(DVec3, bool)> = None;
+        for ((ray, hit), entry) in rays.iter().zip(hits).zip(entries) {
+            let limit = hit.map_or(f64::INFINITY, |hit: Hit| hit.distance);
+            let is_near = match start.filter(|(origin, _)| *origin == ray.origin) {
+                Some((_, is_near)) => is_near,
+                None => self.shells.is_none() || self.beside(ray.origin).near,
+            };
+            start = Some((ray.origin, is_near));
+            let found = if is_near {
+                self.hit(ray, limit)
+            } else {
+                let line = entry.and_then(|entry: Hit| self.look(ray, entry.distance..limit));
+                line.map(|line| self.met(ray, &line))
+            };
+            if let Some(found) = found.filter(|found| found.distance < limit) {
+                *hit = Some(Hit { primitive, ..found });
+            }
+        }
+    }
+
+    /// False where `ray` certainly misses the ball around the outer mesh before `limit`.
+    fn passes(&self, ray: &Ray, limit: f64) -> bool {
+        let Some(shells) = &self.shells else { return true };
+        let (origin, way) = (self.to_own * (ray.origin - self.center), self.to_own * ray.direction);
+        let (scale2, along) = (way.length_squared(), -origin.dot(way));
+        let radius = self.star.bounds.high * shells.fine.reach;
+        let under = radius * radius - (origin + along / scale2 * way).length_squared();
+        let half = (under.max(0.0) * scale2).sqrt();
+        under >= 0.0 && along + half >= 0.0 && along - half <= limit * scale2
+    }
+
+    /// What `ray` meets at `line`.
+    fn met(&self, ray: &Ray, line: &Line) -> Hit {
+        let Line { crossing, before, scale } = line;
+        let normal = (self.to_own.transpose() * crossing.normal).normalize();
+        let position = self.center + self.to_world * crossing.position;
+        hit(ray, before + crossing.distance / scale, position, normal)
+    }
+
+    /// How far along `ray` its surface is first met, by the series alone \[m\]: the twin that tests the meshes.
+    pub fn first_crossing(&self, ray: &Ray) -> Option<f64> {
+        let own = self.to_own * ray.direction;
+        let scale = own.length();
+        let origin = self.to_own * (ray.origin - self.center);
+        self.star.first_crossing(origin, own / scale, f64::INFINITY).map(|crossing| crossing.distance / scale)
+    }
+
+    /// The first crossing of a part of `ray`, whose ends may be within the outer mesh or are certainly not: from where it enters that, by the series.
+    fn first_within(&self, ray: &Ray, part: Range<f64>, [starts_near, ends_near]: [bool; 2]) -> Option<Line> {
+        let Some(shells) = &self.shells else { return self.look(ray, part) };
+        let Range { start, end } = part;
+        let here = Ray { origin: ray.origin + start * ray.direction, direction: ray.direction };
+        match shells.fine.outer.closest_hit(&here, end - start) {
+            Some(outer) if outer.front => self.look(ray, start + outer.distance..end),
+            Some(_) => self.look(ray, start..end),
+            // No way in from outside, and none out to an end that is there.
+            None if starts_near && ends_near => self.look(ray, start..end),
+            None => None,
+        }
+    }
+
+    /// The same by the series alone.
+    fn look(&self, ray: &Ray, part: Range<f64>) -> Option<Line> {
+        let way = self.to_own * ray.direction;
+        let scale = way.length();
+        let origin = self.to_own * (ray.origin + part.start * ray.direction - self.center);
+        let crossing = self.star.first_crossing(origin, way / scale, (part.end - part.start) * scale)?;
+        Some(Line { crossing, before: part.start, scale })
+    }
+}
+
+impl Pair {
+    /// Of the segments from an apex, each from its start on, to the points `asked`: those that do not cross the outer mesh, and those that cross it
+    /// and not the inner one.
+    fn decide(
+        &self,
+        (apex, starts): (Vec3, Option<&Starts>),
+        ends: &Ends,
+        asked: &Lanes,
+        scratch: &mut Scratch,
+    ) -> (Lanes, Lanes) {
+        let mut free = *asked;
+        self.outer.hide_after(apex, starts, ends, &mut free, scratch);
+        let mut open = joined(asked, &free, |asked, free| asked & !free);
+        if open != [0; BUNDLES] {
+            self.inner.hide(apex, ends, &mut open, scratch);
+        }
+        (free, open)
+    }
+}
+
+impl Segment {
+    /// Between two points on the same side, for an object without meshes or from within.
+    fn inside(whole: [Vec3; 2]) -> Segment {
+        Segment { whole, part: whole, near: [true; 2] }
+    }
+}
+
+/// The points in `seen` whose shares are below half of the greatest: what is asked of all of a tile would begin too early for the others.
+fn below_half(shares: &[[f32; BUNDLE]; BUNDLES], seen: &Lanes) -> Lanes {
+    let (mut most, mut below) = (0f32, [0; BUNDLES]);
+    for bundle in 0..BUNDLES {
+        for lane in bits(u32::from(seen[bundle])) {
+            most = most.max(shares[bundle][lane]);
+        }
+    }
+    for bundle in 0..BUNDLES {
+        for lane in bits(u32::from(seen[bundle])) {
+            below[bundle] |= u16::from(shares[bundle][lane] < 0.5 * most) << lane;
+        }
+    }
+    below
+}
+
+/// `of` the lanes of both, bundle by bundle.
+fn joined(a: &Lanes, b: &Lanes, of: impl Fn(u16, u16) -> u16) -> Lanes {
+    let mut lanes = *a;
+    lanes.iter_mut().zip(b).for_each(|(a, b)| *a = of(*a, *b));
+    lanes
+}
+
+/// Clears the bits of `seen` that are set in `asked` where `is_hidden`.
+fn clear_bits(seen: &mut Lanes, asked: Lanes, is_hidden: impl Fn(usize, usize) -> bool) {
+    for bundle in 0..BUNDLES {
+        for lane in bits(u32::from(asked[bundle])) {
+            seen[bundle] &= !(u16::from(is_hidden(bundle, lane)) << lane);
+        }
+    }
+}
