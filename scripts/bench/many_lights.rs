@@ -104,10 +104,11 @@ fn hall(kind: &str, number: u32) -> Model {
     model
 }
 
-/// The place, or one 0.7 m beside it where a luminaire would stick into a column and light the bins within.
+/// The place, or one 0.7 m beside the middle of a column into which a luminaire there would stick, to light the bins within.
 fn beside_columns(place: DVec3) -> DVec3 {
-    let off = |x: f64, step: f64| (x / step - (x / step).round()).abs() * step;
-    if off(place.x, 6.0) < 0.62 && off(place.z, 6.5) < 0.47 { place + 0.7 * DVec3::X } else { place }
+    let off = |x: f64, step: f64| x - (x / step).round() * step;
+    let (x, z) = (off(place.x, 6.0), off(place.z, 6.5));
+    if x.abs() < 0.62 && z.abs() < 0.47 { place + (0.7_f64.copysign(x) - x) * DVec3::X } else { place }
 }
 
 /// A rectangle of 0.6 x 0.3 m that looks down.

@@ -306,12 +306,13 @@ mod tests {
         let middles: Vec<DVec3> = (0..1000).map(place).collect();
         let fluxes = Choice::by_flux(lights.iter().map(|l| l.flux(1.0)));
         let tree = LightTree::new(&middles, &fluxes, |i| Beam::of_light(&lights[i]).unwrap());
-        for (y, normal, sd, most) in [(0.8, DVec3::Y, 0.5, 4.0), (2.0, DVec3::Z, 0.9, 8.0), (5.2, DVec3::Y, 1.2, 9.0)] {
-            for k in 0..40 {
-                let position = DVec3::new(1.37 * f64::from(k) + 2.0, y, 0.9 * f64::from(k) + 1.0);
-                let found = scatter(&lights, &tree, position, normal);
-                assert!(found.0 < sd && found.1 < most, "{position} {normal}: {found:?}");
-            }
+        // The last: 30 cm below their plane, where cosines are small and the nearest is no longer a part of many.
+        for (y, normal, sd, most) in [(0.8, DVec3::Y, 0.4, 2.0), (2.0, DVec3::Z, 1.1, 5.5), (5.2, DVec3::Y, 4.2, 29.0)]
+        {
+            let place = |k: u32| DVec3::new(1.37 * f64::from(k) + 2.0, y, 0.9 * f64::from(k) + 1.0);
+            let found: Vec<(f64, f64)> = (0..40).map(|k| scatter(&lights, &tree, place(k), normal)).collect();
+            let worst = found.iter().fold((0.0, 0.0), |a, b| (f64::max(a.0, b.0), f64::max(a.1, b.1)));
+            assert!(worst.0 < sd && worst.1 < most, "{y} {normal}: {worst:?}");
         }
     }
 

@@ -145,7 +145,7 @@ mod tests {
         let (sin, cos) = sin_cos(angle);
         let axis = DVec3::new(sin, 0.0, cos);
         let height = 1.0 - (1.0 - sine * sine).sqrt();
-        let n = 500_000;
+        let n = 2_000_000;
         let cosine = |k| {
             let u = evenly(DVec2::splat(0.5), k);
             crate::math::to_world(axis, around_z(1.0 - height * u.x, u.y)).z.max(0.0)
