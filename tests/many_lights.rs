@@ -5,14 +5,16 @@ mod common;
 use common::scenes::{PLAIN, add_quad, closed_box, lambert, omni};
 use common::{Case, Comparison, Estimate, assert_all, compare, difference, failures};
 use lampyris::geometry::Ray;
-use lampyris::math::{DMat3, DVec3, PI, sin_cos};
+use lampyris::job::{Job, Transport};
+use lampyris::math::{DMat3, DVec3, PI, cos, sin_cos};
 use lampyris::photometry::Colour;
 use lampyris::random::{Domain, Generator, Stream, sphere};
 use lampyris::scene::photometric_web::{Luminaire, Photometry, Placement};
-use lampyris::scene::{Choice, Light, Model, Reflectance, Surface};
-use lampyris::transport::direct::{from_emitters, from_lights, from_panels};
-use lampyris::transport::lamps::{all, ask, groups_of, panels_of};
+use lampyris::scene::{Light, Model, Reflectance, Surface};
+use lampyris::transport::direct::{from_emitters, from_lights};
+use lampyris::transport::lamps::{all, ask};
 use lampyris::transport::receiver::{Receiver, Response};
+use lampyris::transport::reverse::path;
 use lampyris::transport::shared::of_lights;
 use lampyris::validate::closed_forms::polygon;
 use lampyris::validate::scenes::{UP, points};
@@ -157,12 +159,39 @@ fn rectangles(model: &mut Model, count: u32) -> Vec<([DVec3; 4], f64, bool)> {
     (0..count).map(rectangle).collect()
 }
 
+/// The web of a Lambert surface of 1 m2 and 1 cd/m2 that looks down, every degree; its opening has 0.2 x 0.1 m.
+fn lambert_web() -> Photometry {
+    let list = |of: fn(u32) -> f64| (0..=90).map(|degree| format!("{}\n", of(degree))).collect::<String>();
+    let (angles, cosines) = (list(f64::from), list(|degree| cos(f64::from(degree) * PI / 180.0)));
+    let text = format!("IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 91 1 1 2 0.1 0.2 0\n1 1 20\n{angles}0\n{cosines}");
+    Photometry::parse("web", text.as_bytes()).unwrap()
+}
+
+/// Luminaires that are Lambert rectangles, with their corners and luminance.
+fn lambert_luminaires(model: &mut Model, count: u32) -> Vec<([DVec3; 4], f64)> {
+    let web = lambert_web();
+    let hang = |i: u32| {
+        let (center, factor) = (DVec3::new(0.5 + 0.85 * place(i, count).x, 2.5, 7.75), f64::from(1 + i % 4));
+        let entry = format!(
+            "[[luminaire]]\nfile = \"web\"\nposition = {:?}\nextent = \"opening\"\nmultiplier = {factor}\n{}",
+            center.to_array(),
+            points("p", [([1.0; 3], UP)])
+        );
+        let job = Job::parse(&format!("scene = \"in memory\"\n{entry}"), "in memory").unwrap();
+        model.hang(("in memory", "luminaire"), &job.luminaires[0], &web).unwrap();
+        let (u, v) = (DVec3::X * 0.1, DVec3::Z * 0.05);
+        ([center - u - v, center + u - v, center + u + v, center - u + v], factor / 0.02)
+    };
+    (0..count).map(hang).collect()
+}
+
 #[test]
-fn many_area_lights_sum_up_to_their_closed_forms() {
-    // Black, so that nothing is reflected.
+fn many_lights_with_extent_sum_up_to_their_closed_forms() {
+    // Black, so that nothing is reflected; the luminaires hang beside the rectangles.
     let mut model = closed_box(HALL, &lambert(0.0, 0.0));
-    let count = 150;
-    let all = rectangles(&mut model, count);
+    let mut all = rectangles(&mut model, 150);
+    let luminaires = lambert_luminaires(&mut model, 40);
+    all.extend(luminaires.into_iter().map(|(corners, luminance)| (corners, luminance, true)));
     let places = [([6.0, 0.5, 4.0], UP), ([0.5, 1.0, 0.5], UP), ([11.0, 0.5, 4.0], [-1.0, 0.0, 0.0])];
     let exact = |position: [f64; 3], normal: [f64; 3]| -> f64 {
         let (at, normal) = (DVec3::from(position), DVec3::from(normal));
@@ -172,9 +201,9 @@ fn many_area_lights_sum_up_to_their_closed_forms() {
         };
         all.iter().map(of).sum()
     };
-    let run = "[run]\nhistories_per_batch = 1024\nbatches = 256\nseed = 3\n";
+    let run = "[run]\nhistories_per_batch = 256\nbatches = 64\nseed = 3\n";
     let case = Case::new(&(run.to_owned() + &points("p", places)), model);
-    assert!(case.scene.sources.groups().is_some());
+    assert!(!case.scene.sources.shares_points());
     let shadows = 2e-3;
     let found = case.values();
     let compared = places.iter().zip(&found).enumerate();
@@ -183,41 +212,7 @@ fn many_area_lights_sum_up_to_their_closed_forms() {
 }
 
 #[test]
-fn luminaires_with_extent_are_chosen_by_place_as_by_flux() {
-    let mut model = closed_box(HALL, &lambert(0.5, 0.0));
-    let web = Photometry::parse("web", WEB.as_bytes()).unwrap();
-    for i in 0..60 {
-        let entry = format!(
-            "[[luminaire]]\nfile = \"web\"\nposition = {:?}\nextent = \"opening\"\naim = [0.2, -1.0, 0.1]\n{}",
-            place(i, 60).to_array(),
-            points("p", [([1.0; 3], UP)])
-        );
-        let job = lampyris::job::Job::parse(&format!("scene = \"in memory\"\n{entry}"), "in memory").unwrap();
-        model.hang(("in memory", "luminaire"), &job.luminaires[0], &web).unwrap();
-    }
-    let case = Case::new(&points("p", [([1.0; 3], UP)]), model);
-    let receivers: Vec<Receiver> = tile(&case, false).into_iter().take(6).collect();
-    let mut rng = random("panels");
-    let panels = panels_of(&case.scene, &receivers);
-    let mut estimate = |receiver: &Receiver, rounds: u32, by_flux: bool| {
-        let among = if by_flux { case.scene.sources.panels_by_flux() } else { &panels };
-        let one = |_| from_panels(&case.scene, receiver, among, 16, &mut rng).luminance();
-        Estimate::from_scores((0..rounds).map(one).collect::<Vec<_>>().into_iter())
-    };
-    let all: Vec<Comparison> = receivers
-        .iter()
-        .enumerate()
-        .map(|(i, receiver)| {
-            let (by_place, by_flux) = (estimate(receiver, 6000, false), estimate(receiver, 16000, true));
-            assert!(by_place.standard_error < 0.8 * by_flux.standard_error, "{by_place:?} {by_flux:?}");
-            difference(i, by_place, by_flux)
-        })
-        .collect();
-    assert_all(&all);
-}
-
-#[test]
-fn a_glossy_floor_sees_many_area_lights_as_when_they_are_chosen_by_flux() {
+fn a_glossy_floor_sees_many_area_lights_as_paths_find_them() {
     let mut model = closed_box(HALL, &lambert(0.5, 0.0));
     let reflectance = Reflectance::metallic_roughness(Colour::grey(0.8), 1.0, 0.3);
     // closed_box adds the floor as its third quad.
@@ -233,15 +228,17 @@ fn a_glossy_floor_sees_many_area_lights_as_when_they_are_chosen_by_flux() {
         assert!(response.is_peaked());
         Receiver { position: hit.position, normal: hit.normal, response }
     };
-    let receivers: Vec<Receiver> = [5.0, 5.3, 5.6].map(receiver).to_vec();
-    let groups = groups_of(scene, &receivers).unwrap();
     let mut rng = random("glossy");
-    let mut estimate = |receiver: &Receiver, among: Option<&Choice>| {
-        let one = |_| from_emitters(scene, receiver, among, 64, &mut rng).luminance();
-        Estimate::from_scores((0..1000).map(one).collect::<Vec<_>>().into_iter())
+    let of = |one: &mut dyn FnMut() -> f64, batches: u32, size: u32| {
+        let batch = |_| (0..size).map(|_| one()).sum::<f64>() / f64::from(size);
+        Estimate::from_scores((0..batches).map(batch).collect::<Vec<_>>().into_iter())
     };
-    for (i, receiver) in receivers.iter().enumerate() {
-        let both = difference(i, estimate(receiver, Some(&groups)), estimate(receiver, None));
+    for (i, x) in [5.0, 5.6].into_iter().enumerate() {
+        let receiver = receiver(x);
+        let chosen = of(&mut || from_emitters(scene, &receiver, 64, &mut rng).luminance(), 500, 1);
+        let job = Transport::default();
+        let met = of(&mut || path(scene, &job, &receiver, &mut rng).direct.luminance(), 400, 500);
+        let both = difference(i, chosen, met);
         assert!(both.z().is_some_and(|z| z.abs() < 6.0), "{both:?}");
         assert!(both.estimate.standard_error < 0.02 * both.reference, "{both:?}");
     }
@@ -276,10 +273,11 @@ fn threads_change_no_bit() {
     let scores = |threads: usize| {
         let mut model = hall(100, 0.5);
         rectangles(&mut model, 40);
+        lambert_luminaires(&mut model, 20);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
             let case = Case::new(&whole_job(run), model);
-            assert!(case.scene.sources.groups().is_some());
+            assert!(!case.scene.sources.shares_points());
             let (fixed, batches) = case.batches(0..u32::MAX);
             let values = batches.iter().flat_map(|b| b.sets.iter().flat_map(|s| s.value.iter().chain(&s.direct)));
             values.chain(fixed.iter().flatten()).map(|x| x.to_bits()).collect::<Vec<u64>>()

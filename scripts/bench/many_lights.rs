@@ -1,5 +1,6 @@
 //! Many luminaires of the same flux together in a hall with columns, one thread:
-//! `cargo bench --bench many_lights -- [point|opening|emissive|outside ...] [grid|picture] [N ...]`. Prints markdown tables.
+//! `cargo bench --bench many_lights -- [point|opening|emissive|bulb|outside ...] [grid|picture] [N ...]`. Prints markdown tables.
+//! A bulb is a ball of 128 emissive triangles.
 //!
 //! For a grid and a picture: time before the first batch, time of a history and bin, relative error, and figure of merit as in
 //! `merit`, also against that of the first number of lights. Medians of three seeds. `outside` is `point` with seven times the
@@ -38,7 +39,7 @@ fn main() {
     let named = |names: &[&'static str]| -> Vec<&'static str> {
         names.iter().copied().filter(|name| arguments.iter().any(|a| a == name)).collect()
     };
-    let (kinds, receivers) = (named(&["point", "opening", "emissive", "outside"]), named(&["grid", "picture"]));
+    let (kinds, receivers) = (named(&["point", "opening", "emissive", "bulb", "outside"]), named(&["grid", "picture"]));
     let numbers = if numbers.is_empty() { vec![10, 100, 1000] } else { numbers };
     let kinds = if kinds.is_empty() { vec!["point", "opening", "emissive"] } else { kinds };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread");
@@ -92,8 +93,10 @@ fn hall(kind: &str, number: u32) -> Model {
         let height = if i < number { HEIGHT } else { HALL.y + 4.0 };
         let place =
             DVec3::new(HALL.x * (column + 0.47) / f64::from(columns), height, HALL.z * (row + 0.47) / f64::from(rows));
+        let place = beside_columns(place);
         match kind {
             "emissive" => emissive(&mut model, place, share),
+            "bulb" => bulb(&mut model, place, share),
             "opening" => hang(&mut model, place, share, "opening"),
             _ => hang(&mut model, place, share, "point"),
         }
@@ -101,10 +104,49 @@ fn hall(kind: &str, number: u32) -> Model {
     model
 }
 
+/// The place, or one 0.7 m beside the middle of a column into which a luminaire there would stick, to light the bins within.
+fn beside_columns(place: DVec3) -> DVec3 {
+    let off = |x: f64, step: f64| x - (x / step).round() * step;
+    let (x, z) = (off(place.x, 6.0), off(place.z, 6.5));
+    if x.abs() < 0.62 && z.abs() < 0.47 { place + (0.7_f64.copysign(x) - x) * DVec3::X } else { place }
+}
+
 /// A rectangle of 0.6 x 0.3 m that looks down.
 fn emissive(model: &mut Model, place: DVec3, flux: f64) {
     let luminance = flux / (PI * 0.18);
     add_quad(model, place - DVec3::new(0.3, 0.0, 0.15), DVec3::X * 0.6, DVec3::Z * 0.3, lambert(0.0, luminance));
+}
+
+/// An octahedron of 0.1 m, each face divided in 16, rounded.
+fn bulb(model: &mut Model, place: DVec3, flux: f64) {
+    let radius = 0.1;
+    let luminance = flux / (PI * 4.0 * PI * radius * radius);
+    let number = model.surfaces.len() as u32;
+    model.surfaces.push(lambert(0.0, luminance));
+    let n = 4;
+    for corner in 0..8 {
+        let sign = |bit: u32| if corner >> bit & 1 == 1 { -1.0 } else { 1.0 };
+        let axes = [DVec3::X * sign(0), DVec3::Y * sign(1), DVec3::Z * sign(2)];
+        let even = (corner as u32).count_ones() % 2 == 0;
+        let at = |i: u32, j: u32| {
+            let share = |k: u32| f64::from(k) / f64::from(n);
+            place + radius * (share(i) * axes[0] + share(j) * axes[1] + share(n - i - j) * axes[2]).normalize()
+        };
+        let mut add = |a: DVec3, b: DVec3, c: DVec3| {
+            let first = model.positions.len() as u32;
+            model.positions.extend(if even { [a, b, c] } else { [a, c, b] });
+            model.triangles.push([first, first + 1, first + 2]);
+            model.surface_of.push(number);
+        };
+        for i in 0..n {
+            for j in 0..n - i {
+                add(at(i, j), at(i + 1, j), at(i, j + 1));
+                if i + j + 1 < n {
+                    add(at(i + 1, j), at(i + 1, j + 1), at(i, j + 1));
+                }
+            }
+        }
+    }
 }
 
 fn hang(model: &mut Model, place: DVec3, flux: f64, extent: &str) {

@@ -1,5 +1,5 @@
-//! Light that is sampled because there is much of it, or because it has an extent: many lights, many luminous areas, a luminaire with the
-//! opening of its file.
+//! Light that is sampled because there is much of it, or because it has an extent: many lights, many luminous areas, luminaires with the
+//! opening of their file, spheres, a sky behind a window.
 
 use super::cases::{camera, measured, tables};
 use super::count::{Counted, count};
@@ -10,7 +10,9 @@ use lampyris::math::DVec3;
 use lampyris::scene::Model;
 use lampyris::scene::photometric_web::Photometry;
 use lampyris::validate::experiment::Experiment;
-use lampyris::validate::scenes::{UP, add_quad, closed_box, lambert, omni, point};
+use lampyris::validate::scenes::{
+    UP, add_quad, add_quad_with_hole, box_walls, closed_box, enclosure, lambert, omni, point,
+};
 
 /// Size of the hall \[m\].
 const HALL: DVec3 = DVec3::new(12.0, 3.0, 8.0);
@@ -21,7 +23,7 @@ const WEB: &str = "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 7 1 1 2 0.3 0.6 0\n1 1 20
 /// All cases, printed as they come.
 pub fn run(replicates: u64, mut done: impl FnMut(&[Counted])) -> Result<Vec<Counted>> {
     let mut all = Vec::new();
-    for case in [many_points, many_areas, opening] {
+    for case in [many_points, many_areas, opening, many_openings, spheres, window] {
         let counted = case(replicates)?;
         done(&counted);
         all.extend(counted);
@@ -66,9 +68,43 @@ fn many_areas(n: u64) -> Result<Vec<Counted>> {
 }
 
 fn opening(n: u64) -> Result<Vec<Counted>> {
+    hall("two luminaires with openings in a hall, rqmc, 32 x 32", with_openings(places(2, 1))?, "", n)
+}
+
+fn many_openings(n: u64) -> Result<Vec<Counted>> {
+    hall("60 luminaires with openings in a hall, rqmc, 32 x 32", with_openings(places(10, 6))?, "", n)
+}
+
+/// Balls below the ceiling, which hide one another, and one that stands on the floor between the wall and the meter beside it.
+fn spheres(n: u64) -> Result<Vec<Counted>> {
+    let sphere = |[x, y, z]: [f64; 3]| {
+        format!(
+            "[[source]]\nkind = \"sphere\"\nposition = [{x}, {y}, {z}]\nradius = 0.15\nflux = 500\nreflectance = 0.5\n"
+        )
+    };
+    let hanging: String = places(4, 2).map(|place| sphere((place - 0.2 * DVec3::Y).to_array())).collect();
+    let sources = hanging + &sphere([5.2, 0.15, 0.2]);
+    hall("nine luminous spheres in a hall, rqmc, 32 x 32", closed_box(HALL, &lambert(0.5, 0.0)), &sources, n)
+}
+
+/// A clear sky with its sun through a hole of 4 x 1.5 m in the wall x = 12 m, with the opening to aim at.
+fn window(n: u64) -> Result<Vec<Counted>> {
+    let surface = lambert(0.5, 0.0);
+    let mut walls = box_walls(HALL).to_vec();
+    let facade = walls.remove(1);
+    let mut model = enclosure(&walls, &surface);
+    add_quad_with_hole(&mut model, facade, [0.25, 0.75], [1.0 / 3.0, 2.5 / 3.0], &surface);
+    let sky = "[sky]\nmodel = 12\nhorizontal_illuminance = 10000\nground_reflectance = 0.2\n\
+               [sky.sun]\nazimuth_degrees = 80\nelevation_degrees = 30\nilluminance = 20000\n\
+               [[opening]]\ncorners = [[12, 1, 2], [12, 1, 6], [12, 2.5, 6], [12, 2.5, 2]]\n";
+    hall("sky and sun through a window, rqmc, 32 x 32", model, sky, n)
+}
+
+/// The hall with a luminaire at each of `places`.
+fn with_openings(places: impl Iterator<Item = DVec3>) -> Result<Model> {
     let mut model = closed_box(HALL, &lambert(0.5, 0.0));
     let web = Photometry::parse("web", WEB.as_bytes())?;
-    for place in places(2, 1) {
+    for place in places {
         let entry = format!(
             "scene = \"hall\"\n[[luminaire]]\nfile = \"web\"\nposition = {:?}\nextent = \"opening\"\n{}",
             place.to_array(),
@@ -77,5 +113,5 @@ fn opening(n: u64) -> Result<Vec<Counted>> {
         let job = Job::parse(&entry, "hall")?;
         model.hang(("hall", "luminaire[0]"), &job.luminaires[0], &web)?;
     }
-    hall("two luminaires with openings in a hall, rqmc, 32 x 32", model, "", n)
+    Ok(model)
 }

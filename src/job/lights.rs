@@ -186,6 +186,15 @@ impl Job {
         files.extend(self.luminaires.iter().map(|l| l.file.as_str()).filter(|file| known.insert(*file)));
         files
     }
+
+    /// True where the job adds to its scene a single `[[source]]`, and nothing else that shines or reflects.
+    pub fn adds_one_source(&self) -> bool {
+        self.sources.len() == 1
+            && self.luminaires.is_empty()
+            && self.planes.is_empty()
+            && self.spheres.is_empty()
+            && self.sky.is_none()
+    }
 }
 
 /// Refuses lights out of range, and a job without any.

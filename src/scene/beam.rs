@@ -3,11 +3,12 @@
 //! The intensity towards a direction at the angle t from the axis of a source is at most `envelope(t)`, which does not grow with t. Of webs
 //! it is found at the points of a lattice; what may stand out between them is why nothing there is taken for dark.
 
+use super::body::Body;
 use super::light::Light;
 use super::panel::Panel;
 use super::photometric_web::Luminaire;
 use super::source::Emitter;
-use crate::math::{DVec2, DVec3, PI, acos, asin, cos, to_world};
+use crate::math::{DVec2, DVec3, PI, to_world};
 use crate::random::around_z;
 
 /// Steps of the envelope, even in sin(t/2): the finest near the axis, where beams are narrow.
@@ -18,14 +19,16 @@ const AZIMUTHS: u32 = 16;
 const DRAWN: u32 = 12;
 /// Least share of its greatest intensity that a web is taken to have everywhere.
 const FLOOR: f64 = 1e-3;
+/// What rounding may take from sin(t/2) where an axis is turned by nothing: a fraction of the smallest step.
+const ROUNDING: f64 = 1e-6;
 
-/// A bound of the light of one source.
+/// A bound of the light of one source, or of several together.
 #[derive(Clone, Debug)]
 pub struct Beam {
-    /// Middle of the source \[m\].
-    pub center: DVec3,
-    /// Radius of a ball around it \[m\].
-    pub radius: f64,
+    /// Lowest corner of the box around them \[m\].
+    pub low: DVec3,
+    /// Highest corner \[m\].
+    pub high: DVec3,
     /// Unit vector.
     pub axis: DVec3,
     /// Bound of the intensity from the lower end of each step on \[cd\].
@@ -37,7 +40,7 @@ impl Beam {
     pub(super) fn of_light(light: &Light) -> Option<Beam> {
         match light {
             Light::Directional { .. } => None,
-            Light::Luminaire(luminaire) => Some(Beam::of_web(luminaire, 0.0)),
+            Light::Luminaire(luminaire) => Some(Beam::of_web(luminaire, luminaire.position, luminaire.position)),
             Light::Omni { position, .. } => Some(Beam::falling(light, *position, DVec3::Y)),
             Light::Spot { position, direction, .. } | Light::CosPower { position, direction, .. } => {
                 Some(Beam::falling(light, *position, *direction))
@@ -47,18 +50,62 @@ impl Beam {
 
     /// That of a luminaire with extent.
     pub(super) fn of_panel(panel: &Panel) -> Beam {
-        let corners = panel.faces.iter().flat_map(|face| face.corners);
-        let radius = corners.map(|corner| corner.distance(panel.luminaire.position)).fold(0.0, f64::max);
-        Beam::of_web(&panel.luminaire, radius)
+        let (low, high) = around(panel.faces.iter().flat_map(|face| face.corners));
+        Beam::of_web(&panel.luminaire, low, high)
+    }
+
+    /// That of an emissive triangle.
+    pub(super) fn of_emitter(emitter: &Emitter) -> Beam {
+        let (low, high) = around(emitter.corners.into_iter());
+        let across = emitter.luminance.luminance() * emitter.area;
+        let cosine = |step: usize| (1.0 - 2.0 * lower_end(step) * lower_end(step)).max(0.0);
+        let at = |step: usize| across * if emitter.double_sided { 1.0 } else { cosine(step) };
+        Beam { low, high, axis: emitter.normal, envelope: std::array::from_fn(at) }
+    }
+
+    /// That of an emissive object, as of a ball.
+    pub(super) fn of_body(body: &Body, (center, radius): (DVec3, f64)) -> Beam {
+        let intensity = body.flux().luminance() / (4.0 * PI);
+        let out = DVec3::splat(radius);
+        Beam { low: center - out, high: center + out, axis: DVec3::Y, envelope: [intensity; STEPS + 1] }
+    }
+
+    /// That of all of `beams`, as if they all stood at the same place of the box around them.
+    pub(super) fn of_all(beams: &[Beam]) -> Beam {
+        if let [one] = beams {
+            return one.clone();
+        }
+        let (low, high) = around(beams.iter().flat_map(|beam| [beam.low, beam.high]));
+        let axis = beams.iter().map(|beam| beam.axis * beam.envelope[0]).sum::<DVec3>();
+        let axis = axis.try_normalize().unwrap_or(DVec3::Y);
+        let mut envelope = [0.0; STEPS + 1];
+        for beam in beams {
+            let turned = beam.turned(axis);
+            envelope.iter_mut().zip(turned).for_each(|(sum, bound)| *sum += bound);
+        }
+        Beam { low, high, axis, envelope }
+    }
+
+    /// The envelope around another axis.
+    fn turned(&self, axis: DVec3) -> [f64; STEPS + 1] {
+        let cosine = self.axis.dot(axis).clamp(-1.0, 1.0);
+        let (cos_half, sin_half) = ((0.5 * (1.0 + cosine)).sqrt(), (0.5 * (1.0 - cosine)).sqrt());
+        let at = |step: usize| {
+            let half = lower_end(step);
+            // sin((t - d)/2) of directions at the angle t from the new axis, the old one d beside it.
+            let nearest = half * cos_half - (1.0 - half * half).max(0.0).sqrt() * sin_half;
+            self.envelope[((nearest + ROUNDING).max(0.0) * STEPS as f64) as usize]
+        };
+        std::array::from_fn(at)
     }
 
     /// Of a light whose intensity falls with the angle from its axis.
     fn falling(light: &Light, center: DVec3, axis: DVec3) -> Beam {
         let at = |step: usize| light.at(center + direction(axis, lower_end(step), 0.0)).2.luminance();
-        Beam { center, radius: 0.0, axis, envelope: std::array::from_fn(at) }
+        Beam { low: center, high: center, axis, envelope: std::array::from_fn(at) }
     }
 
-    fn of_web(luminaire: &Luminaire, radius: f64) -> Beam {
+    fn of_web(luminaire: &Luminaire, low: DVec3, high: DVec3) -> Beam {
         let middle = |i: u32| (f64::from(i) + 0.5) / f64::from(DRAWN);
         let drawn = (0..DRAWN * DRAWN).map(|i| luminaire.sample(DVec2::new(middle(i % DRAWN), middle(i / DRAWN))));
         let drawn: Vec<DVec3> = drawn.collect();
@@ -74,29 +121,18 @@ impl Beam {
             envelope[..=last].iter_mut().for_each(|bound| *bound = f64::max(*bound, intensity));
         }
         let floor = FLOOR * envelope[0];
-        Beam { center: luminaire.position, radius, axis, envelope: envelope.map(|bound| bound.max(floor)) }
-    }
-
-    /// Of a group of emissive triangles.
-    pub(super) fn of_emitters(group: &[&Emitter]) -> Beam {
-        let corners = || group.iter().flat_map(|emitter| emitter.corners);
-        let (low, high) = corners().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
-        let center = 0.5 * (low + high);
-        let radius = corners().map(|corner| corner.distance(center)).fold(0.0, f64::max);
-        let sum = group.iter().map(|e| e.normal * e.flux().luminance()).sum::<DVec3>();
-        let axis = sum.try_normalize().unwrap_or(DVec3::Y);
-        let least = group.iter().map(|e| e.normal.dot(axis)).fold(1.0, f64::min);
-        let spread = if group.iter().any(|e| e.double_sided) { PI } else { acos(least.clamp(-1.0, 1.0)) };
-        let across: f64 = group.iter().map(|e| e.luminance.luminance() * e.area).sum();
-        // Light leaves each at no more than 90 degrees from its normal.
-        let at = |step: usize| across * cos((2.0 * asin(lower_end(step)) - spread).max(0.0)).max(0.0);
-        Beam { center, radius, axis, envelope: std::array::from_fn(at) }
+        Beam { low, high, axis, envelope: envelope.map(|bound| bound.max(floor)) }
     }
 
     /// Bound of the intensity towards directions with at most this cosine to the axis \[cd\].
     pub fn envelope(&self, cosine: f64) -> f64 {
         self.envelope[step_of(cosine)]
     }
+}
+
+/// The lowest and the highest corner of the box around `points`.
+fn around(points: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
+    points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)))
 }
 
 /// sin(t/2) at the lower end of a step.

@@ -32,6 +32,8 @@ pub struct Body {
     pub luminance: Colour,
     /// True when the inside emits as well.
     double_sided: bool,
+    /// True of a ball.
+    round: bool,
 }
 
 /// A point of a body.
@@ -51,7 +53,15 @@ impl Body {
         let harmonic = &geometry.harmonics()[object];
         let Surface { emission, double_sided, .. } = *surface;
         let most = harmonic.greatest_area_element();
-        Body { primitive, object, area: harmonic.area(), most, luminance: emission, double_sided }
+        Body {
+            primitive,
+            object,
+            area: harmonic.area(),
+            most,
+            luminance: emission,
+            double_sided,
+            round: harmonic.is_round(),
+        }
     }
 
     fn sides(&self) -> f64 {
@@ -86,9 +96,20 @@ impl Body {
         (height > 0.0 || (height < 0.0 && self.double_sided)).then(|| point.normal * height.signum())
     }
 
+    /// True of a ball: it is seen in all directions of its cone.
+    pub fn is_round(&self) -> bool {
+        self.round
+    }
+
+    /// Centre and radius of a ball around it \[m\].
+    pub fn ball(&self, geometry: &Geometry) -> (DVec3, f64) {
+        let (center, radius, _) = self.harmonic(geometry).around();
+        (center, radius)
+    }
+
     /// The directions from `from` in which it may be seen: the axis of a cone, and one less the cosine of its half angle.
     pub fn seen_from(&self, geometry: &Geometry, from: DVec3) -> (DVec3, f64) {
-        let (center, radius, _) = self.harmonic(geometry).around();
+        let (center, radius) = self.ball(geometry);
         let way = center - from;
         // The square of the sine.
         let share = radius * radius / way.length_squared();

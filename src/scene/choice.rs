@@ -45,11 +45,6 @@ impl Choice {
         self.weights[number]
     }
 
-    /// Sum of the weights of all things before `number`.
-    pub fn before(&self, number: usize) -> f64 {
-        number.checked_sub(1).map_or(0.0, |last| self.sums[last])
-    }
-
     /// The number of the thing in whose share of the running sum `target` lies.
     pub fn at(&self, target: f64) -> usize {
         let number = self.sums.partition_point(|&sum| sum <= target);
@@ -57,12 +52,9 @@ impl Choice {
         if number < self.sums.len() { number } else { self.sums.partition_point(|&sum| sum < self.all()) }
     }
 
-    /// The number of the thing that `u` in [0, 1) chooses, and how far through its share `u` is, 0 .. 1 but for rounding.
-    pub fn choose(&self, u: f64) -> (usize, f64) {
-        let target = u * self.all();
-        let number = self.at(target);
-        let own = self.weights[number];
-        (number, (target - (self.sums[number] - own)) / own)
+    /// The number of the thing that `u` in [0, 1) chooses.
+    pub fn choose(&self, u: f64) -> usize {
+        self.at(u * self.all())
     }
 
     /// Probability with which the thing `number` is chosen.
@@ -78,8 +70,7 @@ mod tests {
     #[test]
     fn things_are_chosen_by_their_shares_and_none_without_weight() {
         let choice = Choice::new(vec![0.0, 1.0, 0.0, 3.0, 0.0]);
-        assert_eq!((choice.choose(0.0), choice.choose(0.125).0, choice.choose(0.25)), ((1, 0.0), 1, (3, 0.0)));
-        assert_eq!(choice.choose(0.625), (3, 0.5));
+        assert_eq!([0.0, 0.125, 0.25, 0.625].map(|u| choice.choose(u)), [1, 1, 3, 3]);
         assert_eq!([choice.at(4.0), choice.at(5.0)], [3, 3]);
         assert_eq!([0, 1, 3].map(|i| choice.probability(i)), [0.0, 0.25, 0.75]);
         assert!(Choice::default().is_empty() && Choice::default().all() == 0.0);

@@ -11,14 +11,15 @@ mod choice;
 mod closed;
 mod environment;
 pub mod gltf;
-mod groups;
 mod light;
+mod light_tree;
 mod luminaires;
 mod luminous_mesh;
 mod materials;
 mod model;
 mod nodes;
 mod opening;
+mod outlook;
 mod panel;
 pub mod photometric_web;
 mod reflectance;
@@ -33,11 +34,12 @@ pub use beam::Beam;
 pub use body::{Body, BodyPoint, in_cone};
 pub use choice::Choice;
 pub use environment::Environment;
-pub use groups::Groups;
 pub use light::Light;
+pub use light_tree::{Chosen, LightTree};
 pub use model::{CameraNode, Model, Replaced, Surface};
 pub use nodes::{Node, Nodes};
 pub use opening::{Aim, Opening};
+pub use outlook::Outlook;
 pub use panel::{Extended, Panel};
 pub use reflectance::{
     Delta, Dielectric, Finish, Glass, LawInLanes, Pane, Reflectance, Scattered, Tabulated, Tint, Tints,
@@ -97,6 +99,7 @@ impl Scene {
     /// As [`Scene::new`].
     pub fn built(mut model: Model, job: &Job, build: Build) -> Result<Scene> {
         let of_panels = model.triangles.len();
+        let alone = model.is_empty() && job.adds_one_source();
         job.sources.iter().try_for_each(|source| model.add_area_source(source))?;
         let offset = -model::middle(&model, &job.spheres);
         let paint = |c: Colour| match job.run.channels {
@@ -139,7 +142,7 @@ impl Scene {
         let given = lights.len();
         let panels = panels(&geometry, of_panels, model.extended, |l| l.moved(offset).recoloured(paint));
         let bodies = bodies(&geometry, &surfaces, &surface_of);
-        let mut sources = Sources::new(lights, emitters, panels, bodies, covered);
+        let mut sources = Sources::new(lights, emitters, panels, bodies, &geometry, covered);
         if let Some(environment) = environment {
             sources = sources.under(environment);
         }
@@ -170,7 +173,8 @@ impl Scene {
         let extremes: Vec<Reflectance> = textures.extremes(|s| &surfaces[s].reflectance).collect();
         let has_peaks = used().chain(&extremes).any(Reflectance::is_peaked);
         let narrowest_lobe = used().chain(&extremes).map(Reflectance::lobe_width).fold(1.0, f64::min);
-        let reflects = used().chain(&extremes).any(|r| !r.is_black());
+        // A flat source and a ball never light themselves.
+        let reflects = !alone && used().chain(&extremes).any(|r| !r.is_black());
         Ok(Scene {
             geometry,
             sources,
@@ -223,7 +227,7 @@ impl Scene {
 
     /// Luminance that a surface emits where `hit`, towards the unit vector `w` \[cd/m2\]; of its lit side.
     pub fn emitted(&self, hit: &Hit, w: DVec3) -> Colour {
-        if let Some((panel, _)) = self.sources.panel_face(hit.primitive) {
+        if let Some((_, panel, _)) = self.sources.panel_face(hit.primitive) {
             return panel.luminance(w);
         }
         let mean = self.surface(hit.primitive).emission;
@@ -232,8 +236,8 @@ impl Scene {
         }
         // Of triangles without light in their part of the texture there is no emitter.
         self.sources
-            .emitter(None, hit.primitive)
-            .map_or(Colour::BLACK, |(emitter, _)| emitter.luminance_at(hit.position))
+            .emitter(hit.primitive)
+            .map_or(Colour::BLACK, |number| self.sources.emitters[number].luminance_at(hit.position))
     }
 
     /// Where daylight enters; none without daylight.

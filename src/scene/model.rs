@@ -64,6 +64,13 @@ pub struct Model {
     pub warnings: Vec<String>,
 }
 
+impl Model {
+    /// True where nothing shines and nothing is there.
+    pub(super) fn is_empty(&self) -> bool {
+        self.triangles.is_empty() && self.replacements.is_empty() && self.lights.is_empty()
+    }
+}
+
 /// A star-shaped object, mostly in the place of the mesh of a node.
 #[derive(Clone, Debug)]
 pub struct Replaced {

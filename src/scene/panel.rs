@@ -101,6 +101,17 @@ impl Panel {
         face.area * if self.flat { cosine.abs() } else { cosine.max(0.0) }
     }
 
+    /// The face that `u` in [0, 1] chooses in proportion to area.
+    pub fn choose_face(&self, u: f64) -> &Emitter {
+        let mut left = u * self.area;
+        let reached = |face: &&Emitter| {
+            left -= face.area;
+            left < 0.0
+        };
+        // Rounding may leave a rest behind the last face.
+        self.faces.iter().find(reached).unwrap_or(&self.faces[self.faces.len() - 1])
+    }
+
     /// Where a history starts, and its direction.
     pub(super) fn emit(&self, geometry: &Geometry, rng: &mut Generator) -> (DVec3, DVec3) {
         let w = self.luminaire.sample(rng.uniform2());

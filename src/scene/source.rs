@@ -7,8 +7,8 @@ use super::beam::Beam;
 use super::body::Body;
 use super::choice::Choice;
 use super::environment::Environment;
-use super::groups::Groups;
 use super::light::Light;
+use super::light_tree::LightTree;
 use super::panel::Panel;
 use super::sky::Sky;
 use super::textures::{Glow, Place};
@@ -17,7 +17,7 @@ use crate::math::{DVec3, PI, to_world};
 use crate::photometry::Colour;
 use crate::random::{Generator, cosine_hemisphere};
 
-/// So many emitters, or fewer, are chosen by flux everywhere.
+/// Of so many emitters, or fewer, receivers share points.
 const FEW_EMITTERS: usize = 64;
 
 /// An emissive triangle: a Lambert area light.
@@ -113,16 +113,14 @@ pub struct Sources {
     emitter_flux: Choice,
     /// Star-shaped objects that emit.
     pub bodies: Vec<Body>,
-    /// The emitters by neighbourhood, where they are many.
-    groups: Option<Groups>,
     /// The same of a body.
     body_flux: Choice,
     /// The same of a panel.
     panel_flux: Choice,
     /// Bounds of the lights; none of parallel light.
     beams: Vec<Option<Beam>>,
-    /// Bounds of the panels.
-    panel_beams: Vec<Beam>,
+    /// The choice of an emitter, a panel or a body for a receiver.
+    trees: [LightTree; 3],
     /// Light from outside, where there is a sky or an opening; parallel light then starts from there.
     pub environment: Option<Environment>,
     /// The choice among the ways of drawing light from outside \[lm\].
@@ -132,12 +130,13 @@ pub struct Sources {
 }
 
 impl Sources {
-    /// Joins `lights`, `emitters`, `panels` and `bodies` over a scene bounded by `covered`; sources without flux are left out.
+    /// Joins `lights`, `emitters`, `panels` and `bodies` over what is in `geometry`, in the sphere `covered`; sources without flux are left out.
     pub fn new(
         lights: Vec<Light>,
         emitters: Vec<Emitter>,
         panels: Vec<Panel>,
         bodies: Vec<Body>,
+        geometry: &Geometry,
         covered: (DVec3, f64),
     ) -> Self {
         let lit = |flux: Colour| flux.luminance() > 0.0;
@@ -149,21 +148,25 @@ impl Sources {
         let panel_flux = Choice::by_flux(panels.iter().map(|p| p.luminaire.flux()));
         let bodies: Vec<Body> = bodies.into_iter().filter(|b| lit(b.flux())).collect();
         let body_flux = Choice::by_flux(bodies.iter().map(Body::flux));
-        let groups = (emitters.len() > FEW_EMITTERS).then(|| Groups::new(&emitters));
         let beams = lights.iter().map(Beam::of_light).collect();
-        let panel_beams = panels.iter().map(Beam::of_panel).collect();
+        let middles: Vec<DVec3> = emitters.iter().map(|e| e.corners.iter().sum::<DVec3>() / 3.0).collect();
+        let of_emitters = LightTree::new(&middles, &emitter_flux, |i| Beam::of_emitter(&emitters[i]));
+        let middles: Vec<DVec3> = panels.iter().map(|p| p.luminaire.position).collect();
+        let of_panels = LightTree::new(&middles, &panel_flux, |i| Beam::of_panel(&panels[i]));
+        let balls: Vec<(DVec3, f64)> = bodies.iter().map(|b| b.ball(geometry)).collect();
+        let middles: Vec<DVec3> = balls.iter().map(|(center, _)| *center).collect();
+        let of_bodies = LightTree::new(&middles, &body_flux, |i| Beam::of_body(&bodies[i], balls[i]));
         Sources {
             lights,
             emitters,
             panels,
             light_flux,
             emitter_flux,
-            groups,
             bodies,
             body_flux,
             panel_flux,
             beams,
-            panel_beams,
+            trees: [of_emitters, of_panels, of_bodies],
             covered,
             environment: None,
             environment_flux: Choice::default(),
@@ -223,41 +226,32 @@ impl Sources {
         &self.light_flux
     }
 
-    /// Bounds of the panels.
-    pub fn panel_beams(&self) -> &[Beam] {
-        &self.panel_beams
+    /// The choice of an emitter for a receiver.
+    pub fn emitter_tree(&self) -> &LightTree {
+        &self.trees[0]
     }
 
-    /// The choice of a panel in proportion to flux.
-    pub fn panels_by_flux(&self) -> &Choice {
-        &self.panel_flux
+    /// The choice of a panel for a receiver.
+    pub fn panel_tree(&self) -> &LightTree {
+        &self.trees[1]
     }
 
-    /// Chooses a face of a panel by `u` in [0, 1), the panel as `among` says and the face in proportion to area: the two, and their
-    /// probability.
-    pub fn choose_face(&self, among: &Choice, u: f64) -> (&Panel, &Emitter, f64) {
-        let (number, left) = among.choose(u);
+    /// The choice of a body for a receiver.
+    pub fn body_tree(&self) -> &LightTree {
+        &self.trees[2]
+    }
+
+    /// True where there are emitters, and so few that points of them serve all receivers.
+    pub fn shares_points(&self) -> bool {
+        (1..=FEW_EMITTERS).contains(&self.emitters.len())
+    }
+
+    /// The panel of which the triangle `primitive` is a face: its number, it, and the face.
+    pub fn panel_face(&self, primitive: u32) -> Option<(usize, &Panel, &Emitter)> {
+        let number = self.panel_with(primitive)?;
         let panel = &self.panels[number];
-        let mut left = left.clamp(0.0, 1.0) * panel.area;
-        let reached = |face: &&Emitter| {
-            left -= face.area;
-            left < 0.0
-        };
-        let face = panel.faces.iter().find(reached).unwrap_or(&panel.faces[panel.faces.len() - 1]);
-        (panel, face, among.probability(number) * face.area / panel.area)
-    }
-
-    /// The panel of which the triangle `primitive` is a face, and the face.
-    pub fn panel_face(&self, primitive: u32) -> Option<(&Panel, &Emitter)> {
-        let panel = &self.panels[self.panel_with(primitive)?];
         let face = panel.faces.get((primitive - panel.faces[0].primitive) as usize)?;
-        Some((panel, face))
-    }
-
-    /// Probability with which [`Sources::choose_face`] chooses `face` of `panel`.
-    pub fn face_probability(&self, among: &Choice, panel: &Panel, face: &Emitter) -> f64 {
-        let number = self.panel_with(face.primitive).expect("a face belongs to a panel");
-        among.probability(number) * face.area / panel.area
+        Some((number, panel, face))
     }
 
     /// Number of the last panel whose faces begin at `primitive` or before.
@@ -265,45 +259,20 @@ impl Sources {
         self.panels.partition_point(|panel| panel.faces[0].primitive <= primitive).checked_sub(1)
     }
 
-    /// The emitters in groups, where they are so many that it pays.
-    pub fn groups(&self) -> Option<&Groups> {
-        self.groups.as_ref()
-    }
-
-    /// Chooses an emitter by `u` in [0, 1), its group as `among` says or in proportion to flux: its number and probability.
-    pub fn choose_emitter(&self, among: Option<&Choice>, u: f64) -> (usize, f64) {
-        if let (Some(groups), Some(among)) = (&self.groups, among) {
-            return groups.choose(among, u);
-        }
-        let number = self.emitter_flux.at(u * self.emitter_flux.all());
+    /// Chooses an emitter in proportion to flux by `u` in [0, 1): its number and probability.
+    pub fn choose_emitter(&self, u: f64) -> (usize, f64) {
+        let number = self.emitter_flux.choose(u);
         (number, self.emitter_flux.probability(number))
     }
 
-    /// The emitter that is the triangle `primitive`, with its probability in [`Sources::choose_emitter`].
-    pub fn emitter(&self, among: Option<&Choice>, primitive: u32) -> Option<(&Emitter, f64)> {
-        let number = self.emitters.binary_search_by_key(&primitive, |e| e.primitive).ok()?;
-        let probability = match (&self.groups, among) {
-            (Some(groups), Some(among)) => groups.probability(among, number),
-            _ => self.emitter_flux.probability(number),
-        };
-        Some((&self.emitters[number], probability))
+    /// The number of the emitter that is the triangle `primitive`.
+    pub fn emitter(&self, primitive: u32) -> Option<usize> {
+        self.emitters.binary_search_by_key(&primitive, |e| e.primitive).ok()
     }
 
-    /// Chooses a body in proportion to flux by `u` in [0, 1): the body and its probability.
-    pub fn choose_body(&self, u: f64) -> (&Body, f64) {
-        let number = self.body_flux.at(u * self.body_flux.all());
-        (&self.bodies[number], self.body_flux.probability(number))
-    }
-
-    /// The body that is the surface `primitive`, with its probability in [`Sources::choose_body`].
-    pub fn body(&self, primitive: u32) -> Option<(&Body, f64)> {
-        let number = self.bodies.iter().position(|body| body.primitive == primitive)?;
-        Some((&self.bodies[number], self.body_flux.probability(number)))
-    }
-
-    /// The emitters with their numbers.
-    pub fn numbered(&self) -> impl Iterator<Item = (u32, &Emitter)> {
-        (0..).zip(&self.emitters)
+    /// The number of the body that is the surface `primitive`.
+    pub fn body(&self, primitive: u32) -> Option<usize> {
+        self.bodies.iter().position(|body| body.primitive == primitive)
     }
 
     /// Starts a history. With a single source no number is drawn for the choice.

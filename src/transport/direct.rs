@@ -9,10 +9,10 @@ use super::lamps::{Asked, all, some_by_flux};
 use super::receiver::Receiver;
 use super::spherical_triangle::SphericalTriangle;
 use crate::geometry::{Hit, Ray};
-use crate::math::DVec3;
+use crate::math::{DVec2, DVec3};
 use crate::photometry::Colour;
-use crate::random::Generator;
-use crate::scene::{Choice, Emitter, Panel, Scene};
+use crate::random::{Generator, evenly};
+use crate::scene::{Chosen, Emitter, LightTree, Outlook, Panel, Scene};
 
 /// From this distance in lengths of its longest edge on, a triangle is sampled by area: the geometric factor then
 /// varies less than threefold over it, and the solid angle of a tiny triangle need not be computed.
@@ -65,68 +65,66 @@ pub(super) fn from_afar(scene: &Scene, ray: &Ray) -> Colour {
     }
 }
 
-/// Unbiased estimate of the light from area lights by `samples` samples, times the response \[lx or cd/m2\]; `among` is the choice of
-/// their groups, without which they are chosen by flux.
-pub fn from_emitters(
-    scene: &Scene,
-    receiver: &Receiver,
-    among: Option<&Choice>,
-    samples: u64,
-    rng: &mut Generator,
-) -> Colour {
-    // Where there are none, or nothing of them arrives.
-    if scene.sources.emitters.is_empty() || among.is_some_and(|among| among.all() == 0.0) {
-        return Colour::BLACK;
-    }
-    let draw = |from: DVec3, choice: f64, rng: &mut Generator| {
-        let (number, probability) = scene.sources.choose_emitter(among, choice);
-        let sight = Sight::new(&scene.sources.emitters[number], probability, from);
-        sight.map_or(Colour::BLACK, |sight| sample_emitter(scene, receiver, &sight, rng))
+/// Unbiased estimate of the light from emissive triangles by `samples` samples, times the response \[lx or cd/m2\].
+pub fn from_emitters(scene: &Scene, receiver: &Receiver, samples: u64, rng: &mut Generator) -> Colour {
+    let emitters = &scene.sources.emitters;
+    let draw = |from: DVec3, chosen: &Chosen, random: DVec2, rng: &mut Generator| {
+        let sight = Sight::new(&emitters[chosen.number], chosen.probability, from);
+        sight.map_or(Colour::BLACK, |sight| sample_emitter(scene, receiver, &sight, random, rng))
     };
     let seen = |from: DVec3, hit: &Hit, w_in: DVec3| {
-        let (emitter, probability) = scene.sources.emitter(among, hit.primitive)?;
-        Some(Sight::new(emitter, probability, from)?.of_hit(hit, w_in))
+        let number = scene.sources.emitter(hit.primitive)?;
+        Some((number, Sight::new(&emitters[number], 1.0, from)?.of_hit(hit, w_in)))
     };
-    sampled(scene, receiver, samples, rng, draw, seen)
+    sampled(scene, receiver, scene.sources.emitter_tree(), (samples, rng), draw, seen)
 }
 
-/// The same of luminaires with extent, chosen as `among` says.
-pub fn from_panels(scene: &Scene, receiver: &Receiver, among: &Choice, samples: u64, rng: &mut Generator) -> Colour {
-    // Where there are none, or nothing of them arrives.
-    if among.all() == 0.0 {
-        return Colour::BLACK;
-    }
-    let draw = |from: DVec3, choice: f64, rng: &mut Generator| {
-        let (panel, face, probability) = scene.sources.choose_face(among, choice);
-        let sight = Sight::new(face, probability, from);
-        sight.map_or(Colour::BLACK, |sight| sample_emitter(scene, receiver, &sight.of(panel), rng))
+/// The same of luminaires with extent.
+pub fn from_panels(scene: &Scene, receiver: &Receiver, samples: u64, rng: &mut Generator) -> Colour {
+    let draw = |from: DVec3, chosen: &Chosen, random: DVec2, rng: &mut Generator| {
+        let panel = &scene.sources.panels[chosen.number];
+        let face = panel.choose_face(chosen.within);
+        let sight = Sight::new(face, chosen.probability * face.area / panel.area, from);
+        sight.map_or(Colour::BLACK, |sight| sample_emitter(scene, receiver, &sight.of(panel), random, rng))
     };
     let seen = |from: DVec3, hit: &Hit, w_in: DVec3| {
-        let (panel, face) = scene.sources.panel_face(hit.primitive)?;
-        let sight = Sight::new(face, scene.sources.face_probability(among, panel, face), from)?;
-        Some(sight.of(panel).of_hit(hit, w_in))
+        let (number, panel, face) = scene.sources.panel_face(hit.primitive)?;
+        let sight = Sight::new(face, face.area / panel.area, from)?;
+        Some((number, sight.of(panel).of_hit(hit, w_in)))
     };
-    sampled(scene, receiver, samples, rng, draw, seen)
+    sampled(scene, receiver, scene.sources.panel_tree(), (samples, rng), draw, seen)
 }
 
-/// The mean of `samples` draws of light at a receiver. `draw` gets the lifted point, where visibility starts (it and what is drawn must
-/// agree on which side of an emitter that is), and a number in [0, 1) for the choice of the emitter, stratified over the samples;
-/// a peaked response looks as well for those that `seen` knows, see [`sample_response`].
+/// The mean of so many samples of the light of the sources of `tree`. `draw` gets the lifted point, where visibility starts (it and what is
+/// drawn must agree on which side of an emitter that is), the source chosen, and a point of the unit square, even over the samples;
+/// a peaked response looks as well for the sources that `seen` knows: their number, and luminance and density as if that were chosen,
+/// see [`sample_response`].
 pub(super) fn sampled(
     scene: &Scene,
     receiver: &Receiver,
-    samples: u64,
-    rng: &mut Generator,
-    draw: impl Fn(DVec3, f64, &mut Generator) -> Colour,
-    seen: impl Fn(DVec3, &Hit, DVec3) -> Option<(Colour, f64)>,
+    tree: &LightTree,
+    (samples, rng): (u64, &mut Generator),
+    draw: impl Fn(DVec3, &Chosen, DVec2, &mut Generator) -> Colour,
+    seen: impl Fn(DVec3, &Hit, DVec3) -> Option<(usize, (Colour, f64))>,
 ) -> Colour {
     let from = scene.geometry.lift(receiver.position, receiver.normal);
+    let outlook = Outlook::of_point(from, receiver.normal);
+    if !tree.gives_light(&outlook) {
+        return Colour::BLACK;
+    }
     let mut sum = Colour::BLACK;
-    for k in 0..samples {
-        let choice = (k as f64 + rng.uniform()) / samples as f64;
-        sum += draw(from, choice, rng);
-        if receiver.response.is_peaked() {
-            sum += sample_response(scene, receiver, from, rng, |hit, w_in| seen(from, hit, w_in));
+    let jitter: Vec<f64> = (0..samples).map(|_| rng.uniform()).collect();
+    let shift = rng.uniform2();
+    for (k, chosen) in (0..).zip(tree.choose(&outlook, &jitter)) {
+        sum += draw(from, &chosen, evenly(shift, k), rng);
+    }
+    if receiver.response.is_peaked() {
+        let seen = |hit: &Hit, w_in: DVec3| {
+            let (number, (luminance, density)) = seen(from, hit, w_in)?;
+            Some((luminance, density * tree.probability(&outlook, number)))
+        };
+        for _ in 0..samples {
+            sum += sample_response(scene, receiver, from, rng, seen);
         }
     }
     sum / samples as f64
@@ -145,16 +143,17 @@ pub fn from_some_emitters(
     for &number in some {
         let emitter = &scene.sources.emitters[number as usize];
         if let Some(sight) = Sight::new(emitter, 1.0, lifted) {
-            let of_one: Colour = (0..samples).map(|_| sample_emitter(scene, receiver, &sight, rng)).sum();
-            sum += of_one;
+            let shift = rng.uniform2();
+            let sample = |k| sample_emitter(scene, receiver, &sight, evenly(shift, k), rng);
+            sum += (0..samples).map(sample).sum::<Colour>();
         }
     }
     sum / samples as f64
 }
 
 /// One sample of the light from the emitter in sight.
-fn sample_emitter(scene: &Scene, receiver: &Receiver, sight: &Sight, rng: &mut Generator) -> Colour {
-    let Some(point) = sight.sample(rng) else { return Colour::BLACK };
+fn sample_emitter(scene: &Scene, receiver: &Receiver, sight: &Sight, random: DVec2, rng: &mut Generator) -> Colour {
+    let Some(point) = sight.sample(random, rng) else { return Colour::BLACK };
     let w_in = (sight.from - point).normalize();
     let cosine = -receiver.normal.dot(w_in);
     let target = scene.geometry.lift(point, sight.normal).as_vec3();
@@ -234,9 +233,8 @@ impl<'a> Sight<'a> {
 
     /// A point of the emitter. The luminance of a luminaire grows without bound where it is seen edge-on and still shines: by area
     /// that is bounded, by solid angle contact is, so half of the points are drawn in each of the two ways.
-    fn sample(&self, rng: &mut Generator) -> Option<DVec3> {
+    fn sample(&self, random: DVec2, rng: &mut Generator) -> Option<DVec3> {
         let by_area = self.triangle.is_none() || (self.panel.is_some() && rng.uniform() < 0.5);
-        let random = rng.uniform2();
         let Some(triangle) = self.triangle.as_ref().filter(|_| !by_area) else {
             return Some(self.emitter.point(random));
         };

@@ -9,17 +9,13 @@
 //! A light is left out only where nothing of it can arrive: below the horizon of the whole tile, or outside a cone that ends.
 
 use super::receiver::Receiver;
-use crate::math::DVec3;
 use crate::random::Generator;
-use crate::scene::{Beam, Choice, Scene};
-use std::borrow::Cow;
+use crate::scene::{Outlook, Scene};
 
 /// So many lights, or fewer, are all asked.
 const FEW: usize = 16;
 /// Lights chosen where a rough mean is enough.
 const ROUGHLY: u32 = 8;
-/// Least distance for which bounds are told apart, in sizes of the tile: nearer lights are asked for certain anyway.
-const NEAREST: f64 = 0.05;
 
 /// A light to be asked: its number, and what its light is multiplied by.
 pub type Asked = (usize, f64);
@@ -31,27 +27,10 @@ pub fn ask(scene: &Scene, receivers: &[Receiver], wanted: u64, rng: &mut Generat
     if !is_choice(scene, wanted) {
         return all(scene);
     }
-    let tile = Outlook::new(receivers);
+    let tile = Outlook::of(receivers.iter().map(|r| (r.position, r.normal)));
     let bounds: Vec<f64> =
         scene.sources.beams().iter().map(|b| b.as_ref().map_or(f64::INFINITY, |b| tile.bound(b))).collect();
     systematic(&probabilities(&bounds, wanted as f64), rng.uniform())
-}
-
-/// The choice of a luminaire with extent for `receivers`: by what each can give in the tile, or by flux where they are few.
-pub fn panels_of<'a>(scene: &'a Scene, receivers: &[Receiver]) -> Cow<'a, Choice> {
-    let sources = &scene.sources;
-    if sources.panels.len() <= FEW {
-        return Cow::Borrowed(sources.panels_by_flux());
-    }
-    let tile = Outlook::new(receivers);
-    Cow::Owned(Choice::new(sources.panel_beams().iter().map(|beam| tile.bound(beam)).collect()))
-}
-
-/// The choice of a group of emissive triangles for `receivers`, where there are groups.
-pub fn groups_of(scene: &Scene, receivers: &[Receiver]) -> Option<Choice> {
-    let groups = scene.sources.groups()?;
-    let tile = Outlook::new(receivers);
-    Some(Choice::new(groups.beams().iter().map(|beam| tile.bound(beam)).collect()))
 }
 
 /// True where there are more lights than are wanted, and more than few.
@@ -78,7 +57,7 @@ pub fn some_by_flux(scene: &Scene, rng: &mut Generator) -> Vec<Asked> {
     // Under a sky parallel light has no flux of its own here.
     let others = if among.all() > 0.0 { ROUGHLY } else { 0 };
     for k in 0..others {
-        let (light, _) = among.choose((f64::from(k) + u) / f64::from(ROUGHLY));
+        let light = among.choose((f64::from(k) + u) / f64::from(ROUGHLY));
         if beams[light].is_some() {
             asked.push((light, 1.0 / (f64::from(ROUGHLY) * among.probability(light))));
         }
@@ -123,55 +102,6 @@ fn systematic(probabilities: &[f64], u: f64) -> Vec<Asked> {
         }
     }
     asked
-}
-
-/// What a tile of receivers looks like from the lights.
-struct Outlook {
-    low: DVec3,
-    high: DVec3,
-    center: DVec3,
-    /// Half the diagonal of the box around them \[m\].
-    radius: f64,
-    normal: DVec3,
-    /// Cosine of the largest angle between `normal` and one of their normals.
-    spread: f64,
-}
-
-impl Outlook {
-    fn new(receivers: &[Receiver]) -> Self {
-        let empty = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        let (low, high) = receivers.iter().fold(empty, |(low, high), r| (low.min(r.position), high.max(r.position)));
-        let normal = receivers.iter().map(|r| r.normal).sum::<DVec3>().try_normalize().unwrap_or(DVec3::Y);
-        let spread = receivers.iter().map(|r| r.normal.dot(normal)).fold(1.0, f64::min);
-        Outlook { low, high, center: 0.5 * (low + high), radius: 0.5 * low.distance(high), normal, spread }
-    }
-
-    /// Bound of the illuminance that a source gives anywhere in the tile \[lx\]; nearer than the tile is large, an idea of it.
-    fn bound(&self, beam: &Beam) -> f64 {
-        let gap = (self.low - beam.center).max(beam.center - self.high).max(DVec3::ZERO).length() - beam.radius;
-        let nearest = NEAREST * (self.radius + beam.radius) + f64::MIN_POSITIVE.sqrt();
-        let d2 = gap.max(nearest) * gap.max(nearest);
-        let way = self.center - beam.center;
-        let (distance, reach) = (way.length(), self.radius + beam.radius);
-        if reach >= distance {
-            return beam.envelope(1.0) / d2;
-        }
-        // The tile and the source fill the cone with this sine around the way from middle to middle.
-        let sine = reach / distance;
-        let cone = (1.0 - sine * sine).sqrt();
-        let there = nearer(beam.axis.dot(way) / distance, cone);
-        let here = nearer(nearer(-self.normal.dot(way) / distance, cone), self.spread);
-        beam.envelope(there) * here.max(0.0) / d2
-    }
-}
-
-/// Cosine of the angle with `cosine` made smaller by the one with the cosine `by`, but not below zero.
-fn nearer(cosine: f64, by: f64) -> f64 {
-    if cosine >= by {
-        return 1.0;
-    }
-    let sines = (1.0 - cosine * cosine).max(0.0) * (1.0 - by * by).max(0.0);
-    cosine * by + sines.sqrt()
 }
 
 #[cfg(test)]

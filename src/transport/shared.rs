@@ -12,7 +12,7 @@
 use super::bodies::from_bodies;
 use super::connection::{Connected, Connectors, Link, LitPoint, Rule, TILE, Tile, connect};
 use super::direct::{from_afar, from_emitters, from_panels, from_some_emitters};
-use super::lamps::{Asked, ask, groups_of, is_choice, panels_of};
+use super::lamps::{Asked, ask, is_choice};
 use super::receiver::Receiver;
 use super::sky::from_sky;
 use crate::geometry::Ray;
@@ -22,7 +22,7 @@ use crate::photometry::Colour;
 use crate::random::Generator;
 use crate::random::sobol::PointSet;
 use crate::scene::photometric_web::Luminaire;
-use crate::scene::{Choice, Emitter, Light, Scene};
+use crate::scene::{Emitter, Light, Scene};
 use std::ops::Range;
 
 /// Nearer than this to the centre, in lengths of its longest edge, an emitter is sampled for each receiver alone.
@@ -32,55 +32,38 @@ const ASKING_TOGETHER: usize = 64;
 /// Points whose light is summed in f32 before it goes into f64.
 pub const TOGETHER: usize = 16;
 
-/// Points of the emitters of a scene: numbers in the unit cube that receivers share, and what they stand for.
-///
-/// Where emitters are many the same numbers stand for other points in each tile, whose emitters are chosen by what they give there.
-#[derive(Debug)]
+/// Points of the emitters of a scene that receivers share, in runs of [`TOGETHER`]; none where there are many emitters, among which each
+/// receiver chooses for itself.
+#[derive(Debug, Default)]
 pub struct LitPoints {
-    set: PointSet,
-    count: u32,
-    /// The points where emitters are chosen by flux, in runs of [`TOGETHER`].
-    by_flux: Option<Connectors>,
+    runs: Connectors,
 }
 
 impl LitPoints {
     /// `count` points, a power of two, by the numbers of `set`.
-    pub fn new(scene: &Scene, set: PointSet, count: u32) -> Self {
-        let mut points = LitPoints { set, count, by_flux: None };
-        if !scene.sources.emitters.is_empty() && scene.sources.groups().is_none() {
-            points.by_flux = Some(points.of_runs(scene, None, 0..points.runs()));
+    pub fn new(scene: &Scene, set: &PointSet, count: u32) -> Self {
+        let mut points = LitPoints::default();
+        if !scene.sources.shares_points() {
+            return points;
+        }
+        for first in (0..count).step_by(TOGETHER) {
+            let run = first..(first + TOGETHER as u32).min(count);
+            let run: Vec<LitPoint> = run.flat_map(|i| lit_point(scene, set.point(i), count)).collect();
+            points.runs.push_lit(scene, &run);
         }
         points
     }
+}
 
-    /// Number of runs.
-    fn runs(&self) -> usize {
-        (self.count as usize).div_ceil(TOGETHER)
-    }
-
-    /// The points of some runs, the groups of their emitters chosen as `among` says.
-    fn of_runs(&self, scene: &Scene, among: Option<&Choice>, runs: Range<usize>) -> Connectors {
-        let mut connectors = Connectors::default();
-        for run in runs {
-            let first = (run * TOGETHER) as u32;
-            let points = first..(first + TOGETHER as u32).min(self.count);
-            let points: Vec<LitPoint> = points.flat_map(|i| self.lit_point(scene, among, i)).collect();
-            connectors.push_lit(scene, &points);
-        }
-        connectors
-    }
-
-    /// Point number `i`, on both sides of an emitter that has two.
-    fn lit_point(&self, scene: &Scene, among: Option<&Choice>, i: u32) -> impl Iterator<Item = LitPoint> {
-        let [choice, x, y, ..] = self.set.point(i);
-        let (number, probability) = scene.sources.choose_emitter(among, choice);
-        let emitter = &scene.sources.emitters[number];
-        let position = emitter.point(DVec2::new(x, y));
-        let intensity = emitter.luminance_at(position) * (emitter.area / (probability * f64::from(self.count)));
-        let lit = move |normal: DVec3| LitPoint { position, normal, intensity, emitter: number as u32 };
-        let sides = if emitter.double_sided { 2 } else { 1 };
-        [emitter.normal, -emitter.normal].into_iter().take(sides).map(lit)
-    }
+/// The point of an emitter that `numbers` draw, one of `count`, on both sides where both emit.
+fn lit_point<const N: usize>(scene: &Scene, numbers: [f64; N], count: u32) -> impl Iterator<Item = LitPoint> + use<N> {
+    let (number, probability) = scene.sources.choose_emitter(numbers[0]);
+    let emitter = &scene.sources.emitters[number];
+    let position = emitter.point(DVec2::new(numbers[1], numbers[2]));
+    let intensity = emitter.luminance_at(position) * (emitter.area / (probability * f64::from(count)));
+    let lit = move |normal: DVec3| LitPoint { position, normal, intensity, emitter: number as u32 };
+    let sides = if emitter.double_sided { 2 } else { 1 };
+    [emitter.normal, -emitter.normal].into_iter().take(sides).map(lit)
 }
 
 /// Points of emitters that receivers share.
@@ -97,35 +80,42 @@ pub struct Shared<'a> {
 impl<'a> Shared<'a> {
     /// All `points`.
     pub fn all(points: &'a LitPoints) -> Self {
-        Shared { points, some: 0..points.runs(), weight: 1.0 }
+        Shared { points, some: 0..points.runs.histories(), weight: 1.0 }
     }
 
     /// The run number `run`.
     pub fn run(points: &'a LitPoints, run: usize) -> Self {
-        Shared { points, some: run..run + 1, weight: points.runs() as f64 }
+        Shared { points, some: run..run + 1, weight: points.runs.histories() as f64 }
     }
 
-    /// What they give the receivers of `tile`, the groups of emitters chosen as `among` says.
-    fn connect(&self, scene: &Scene, among: Option<&Choice>, tile: &Tile, rule: &Rule) -> Vec<Connected> {
-        match &self.points.by_flux {
-            Some(points) => connect(scene, points, self.some.clone(), tile, rule),
-            None => {
-                let points = self.points.of_runs(scene, among, self.some.clone());
-                connect(scene, &points, 0..points.histories(), tile, rule)
-            }
-        }
+    /// What they give `receivers`, at most a tile, but for the emitters that are too `near` to some of them.
+    fn connect(&self, scene: &Scene, receivers: &[Receiver], near: &[Near], channels: usize) -> Vec<Connected> {
+        let link = |&receiver| Link { owner: 0, receiver, start: Colour::BLACK, watched: false };
+        let tile = Tile::new(scene, receivers.iter().map(link).collect(), 0).refusing(near.iter().cloned());
+        let rule = Rule { bound: f64::INFINITY, channels, orders: 0..1 };
+        connect(scene, &self.points.runs, self.some.clone(), &tile, &rule)
     }
 }
 
-/// Direct light at `receivers`, at most a tile, each with its generator, times their responses \[lx or cd/m2\]: from lights
-/// without extent, some `lamps` of them where there are more, none where it is 0; from emitters by the shared points, or by `samples`
-/// of its own.
+/// How much of the direct light is asked at a receiver.
+#[derive(Clone, Copy, Debug)]
+pub struct Effort {
+    /// Lights without extent, where there are more; 0: none.
+    pub lamps: u64,
+    /// Samples of each kind of light with an extent.
+    pub samples: u64,
+    /// Samples of the sky.
+    pub of_sky: u64,
+}
+
+/// Direct light at `receivers`, at most a tile, each with its generator, times their responses \[lx or cd/m2\]: from few emitters by
+/// the shared points, else by samples of its own.
 pub fn direct_light(
     scene: &Scene,
     receivers: &mut [(Receiver, &mut Generator)],
     shared: &Shared,
-    samples: u64,
-    (lamps, channels): (u64, usize),
+    Effort { lamps, samples, of_sky }: Effort,
+    channels: usize,
 ) -> Vec<Colour> {
     let places: Vec<Receiver> = receivers.iter().map(|(r, _)| *r).collect();
     let together = if is_choice(scene, lamps) { ASKING_TOGETHER } else { TILE };
@@ -134,59 +124,39 @@ pub fn direct_light(
         let asked = if lamps > 0 { ask(scene, places, lamps, receivers[0].1) } else { Vec::new() };
         light.extend(of_lights(scene, places, &asked));
     }
-    let chunks = places.chunks(BUNDLE).zip(receivers.chunks_mut(BUNDLE)).zip(light.chunks_mut(BUNDLE));
-    for ((places, receivers), light) in chunks {
-        let panels = panels_of(scene, places);
-        for ((receiver, rng), light) in receivers.iter_mut().zip(light) {
-            *light += from_panels(scene, receiver, &panels, samples, rng);
-            *light += from_bodies(scene, receiver, samples, rng);
-            *light += from_sky(scene, receiver, samples, rng);
+    for ((receiver, rng), light) in receivers.iter_mut().zip(&mut light) {
+        *light += from_panels(scene, receiver, samples, rng);
+        *light += from_bodies(scene, receiver, samples, rng);
+        *light += from_sky(scene, receiver, of_sky, rng);
+        if receiver.response.is_peaked() || !scene.sources.shares_points() {
+            *light += from_emitters(scene, receiver, samples, rng);
         }
     }
-    if scene.sources.emitters.is_empty() {
-        return light;
-    }
-    let groups = groups_of(scene, &places);
-    let groups = groups.as_ref();
-    if groups.is_some_and(|groups| groups.all() == 0.0) {
-        return light;
-    }
-    let near = near_emitters(scene, &places);
-    let tile = Tile::new(scene, places.iter().map(link).collect(), 0);
-    let refused = near.iter().map(|(number, near)| (*number, near.clone()));
-    let rule = Rule { bound: f64::INFINITY, channels, orders: 0..1 };
-    let connected = shared.connect(scene, groups, &tile.refusing(refused), &rule);
-    for (i, (receiver, rng)) in receivers.iter_mut().enumerate() {
-        light[i] += if receiver.response.is_peaked() {
-            from_emitters(scene, receiver, groups, samples, rng)
-        } else {
+    if scene.sources.shares_points() {
+        let near = near_emitters(scene, &places);
+        let connected = shared.connect(scene, &places, &near, channels);
+        let matt = receivers.iter_mut().enumerate().filter(|(_, (receiver, _))| !receiver.response.is_peaked());
+        for (i, (receiver, rng)) in matt {
             let own: Vec<u32> = near.iter().filter(|(_, near)| near[i]).map(|(number, _)| *number).collect();
-            connected[i].sum * shared.weight + from_some_emitters(scene, receiver, &own, samples, rng)
-        };
+            light[i] += connected[i].sum * shared.weight + from_some_emitters(scene, receiver, &own, samples, rng);
+        }
     }
     light
 }
 
-fn link(receiver: &Receiver) -> Link {
-    Link { owner: 0, receiver: *receiver, start: Colour::BLACK, watched: false }
-}
+/// The number of an emitter, and for each receiver whether it is too near.
+type Near = (u32, Vec<bool>);
 
-/// The emitters that are too near to some of the receivers, with the receivers.
-fn near_emitters(scene: &Scene, receivers: &[Receiver]) -> Vec<(u32, Vec<bool>)> {
-    let empty = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    let (low, high) = receivers.iter().fold(empty, |(l, h), r| (l.min(r.position), h.max(r.position)));
+/// The emitters that are too near to some of the receivers.
+fn near_emitters(scene: &Scene, receivers: &[Receiver]) -> Vec<Near> {
     let near = |(number, emitter): (u32, &Emitter)| {
         let ([a, b, c], reach) = (emitter.corners, NEAR * NEAR * emitter.longest_edge_squared());
         let middle = (a + b + c) / 3.0;
-        // A look at the box around all of them: of many emitters few are near.
-        if middle.clamp(low, high).distance_squared(middle) > reach {
-            return None;
-        }
         let is_near = |r: &Receiver| r.position.distance_squared(middle) < reach;
         let near: Vec<bool> = receivers.iter().map(is_near).collect();
         near.contains(&true).then_some((number, near))
     };
-    scene.sources.numbered().filter_map(near).collect()
+    (0..).zip(&scene.sources.emitters).filter_map(near).collect()
 }
 
 /// Light from the lights `asked` at `receivers`, at most a tile, times their responses \[lx or cd/m2\].

@@ -17,14 +17,6 @@ const SHARDS: u64 = 4;
 
 /// An infinite plane below the room: it has nothing to do with the light in it, but makes the scene an open one.
 const OPEN: &str = "[[plane]]\npoint = [0.0, -3.0, 0.0]\nnormal = [0.0, 1.0, 0.0]\nreflectance = 0.3\n[[camera]]\n";
-/// Daylight, an opening to aim at, and area sources.
-const OF_SKY: (&str, &str) = (
-    "[[camera]]\n",
-    "[sky]\nmodel = 12\nhorizontal_illuminance = 10000\nground_reflectance = 0.2\n[sky.sun]\nazimuth_degrees = 20\n\
-     elevation_degrees = 40\nilluminance = 30000\n[[opening]]\ncorners = [[1, 1, -4], [3, 1, -4], [3, 2, -4]]\n\
-     [[source]]\nkind = \"sphere\"\nposition = [1, 2, -1]\nradius = 0.1\nflux = 100\n[[source]]\nkind = \"disc\"\n\
-     position = [2, 2, -1]\ndirection = [0, -1, 0]\nradius = 0.1\nluminance = 1000\n[[camera]]\n",
-);
 /// Laws that the room has not: matt and glossy ones, a mirror of steel and a picture with a texture are there already.
 const OF_SURFACES: (&str, &str) = (
     "[[camera]]\n",
@@ -36,6 +28,88 @@ const OF_SURFACES: (&str, &str) = (
      [[material]]\nname = \"apple\"\nkind = \"glass\"\ntransmittance_per_metre = 0.1\n[[camera]]\n",
 );
 const FLOOR: &str = "lampyris-brdf 1\nchannels 1\ntheta 0 80\nphi 0 180\n0.1 0.1\n0.1 0.1\n0.1 0.1\n0.1 0.4\n";
+/// Every kind of light, and of most kinds so many that they are chosen: parallel light and a sky, an opening to aim at, more than 16 lights
+/// without extent, more than 64 emissive triangles, spheres, a luminaire of every shape, and a mesh that shines.
+fn of_lights() -> String {
+    let omni = |i: u32| {
+        let x = 0.4 + 0.25 * f64::from(i);
+        format!("[[source]]\nkind = \"omni\"\nposition = [{x}, 2.2, -0.4]\nintensity = {}\n", 1 + i % 3)
+    };
+    let luminaire = |(i, file): (usize, &&str)| {
+        let (x, z) = (0.7 + 0.6 * i as f64, -3.2);
+        format!(
+            "[[luminaire]]\nfile = \"{file}\"\nposition = [{x}, 2.0, {z}]\nextent = \"opening\"\nmultiplier = 0.1\n"
+        )
+    };
+    let omnis: String = (0..14).map(omni).collect();
+    let luminaires: String = OPENINGS.iter().enumerate().map(luminaire).collect();
+    LIGHTS.to_owned() + &omnis + &luminaires
+}
+
+/// Files of luminaires of tests/luminaires.
+const OPENINGS: [&str; 7] = [
+    "opening_rectangle.ies",
+    "opening_disc.ies",
+    "opening_box.ies",
+    "opening_cylinder_upright.ies",
+    "opening_cylinder_along_c0.ies",
+    "opening_cylinder_across_c0.ies",
+    "opening_sphere.ies",
+];
+const LIGHTS: &str = "\
+[sky]
+model = 12
+horizontal_illuminance = 10000
+ground_reflectance = 0.2
+[sky.sun]
+azimuth_degrees = 20
+elevation_degrees = 40
+illuminance = 30000
+[[opening]]
+corners = [[1, 1, -4], [3, 1, -4], [3, 2, -4]]
+[[source]]
+kind = \"sphere\"
+position = [1, 2, -1]
+radius = 0.1
+flux = 100
+[[source]]
+kind = \"sphere\"
+position = [4, 2, -1]
+radius = 0.05
+flux = 50
+[[source]]
+kind = \"disc\"
+position = [2, 2, -1]
+direction = [0, -1, 0]
+radius = 0.1
+luminance = 1000
+[[source]]
+kind = \"rectangle\"
+position = [3, 2, -1]
+direction = [0, -1, 0.5]
+along = [1, 0, 0]
+size = [0.4, 0.2]
+flux = 100
+two_sided = true
+[[source]]
+kind = \"spot\"
+position = [3, 2.2, -2]
+direction = [0, -1, 0]
+intensity = 100
+inner_degrees = 10
+outer_degrees = 20
+[[source]]
+kind = \"cos_power\"
+position = [2, 2.2, -2]
+direction = [0, -1, 0.2]
+intensity = 100
+exponent = 4
+[[luminaire]]
+file = \"opening_box.ies\"
+mesh = \"book\"
+";
+/// The one sky that the variant of all lights has not.
+const OF_SKY: (&str, &str) = ("[[camera]]\n", "[sky]\nmodel = \"uniform\"\nzenith_luminance = 1000\n[[camera]]\n");
 const RANDOM: (&str, &str) = ("seed = 23", "seed = 23\nsampling = \"random\"");
 const RGB: (&str, &str) = ("seed = 23", "seed = 23\nchannels = \"rgb\"");
 const OF_OPEN: (&str, &str) = ("[[camera]]\n", OPEN);
@@ -48,20 +122,21 @@ const DULL: (&str, &str) = ("room.glb", "dull.glb");
 /// Name and changes.
 type Variant = (&'static str, &'static [(&'static str, &'static str)]);
 
-const VARIANTS: [Variant; 8] = [
+const VARIANTS: [Variant; 7] = [
     ("closed", &[]),
     ("random-rgb", &[RANDOM, RGB]),
     ("open", &[OF_OPEN, DULL]),
     ("open-random-rgb", &[OF_OPEN, RANDOM, RGB]),
-    ("plain", &[PLAIN]),
+    ("plain-sky", &[PLAIN, OF_SKY]),
     ("reverse-rgb", &[REVERSE, RGB]),
     ("surfaces", &[("room.glb", "peaked.glb"), OF_SURFACES, RGB]),
-    ("sky", &[OF_SKY]),
 ];
 
 /// A place with the scenes of all variants.
 fn place() -> Place {
     let place = Place::new();
+    let webs = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/luminaires");
+    OPENINGS.iter().for_each(|file| drop(fs::copy(webs.join(file), place.path(file)).unwrap()));
     let scene = fs::read(place.path("room.glb")).unwrap();
     fs::write(place.path("floor.brdf"), FLOOR).unwrap();
     for (name, digit) in [("dull.glb", b'9'), ("peaked.glb", b'1')] {
@@ -161,6 +236,22 @@ fn every_variant_is_exact() {
     for (name, changes) in VARIANTS {
         assert_exact(name, changes);
     }
+}
+
+#[test]
+fn every_kind_of_light_is_exact_with_all_instructions() {
+    let lights = of_lights() + "[[camera]]\n";
+    let changes = [("[[camera]]\n", lights.as_str())];
+    assert_exact("lights", &changes);
+    let place = place();
+    let job = job_of(&place, "lights", &changes);
+    let on_path = |path: &simd::Path| {
+        let dir = place.path(path.name());
+        expect(0, run_quietly(&job, &dir, 2).env(simd::VARIABLE, path.name()));
+        results(&dir)
+    };
+    let all: Vec<Results> = simd::Path::ALL.iter().filter(|path| path.is_available()).map(on_path).collect();
+    assert!(all.iter().all(|results| *results == all[0]));
 }
 
 #[test]

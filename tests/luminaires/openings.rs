@@ -51,8 +51,7 @@ fn a_lambertian_disc_is_exact_near_by_and_a_point_far_off() {
         // E = M r^2/(r^2 + d^2), M = flux over area.
         let exact = 100.0 / PI / (radius * radius + distance * distance);
         let receiver = meter(&disc, [0.0, -distance, 0.0], UP);
-        let (mean, error) =
-            sampled(1024, || from_panels(&disc, &receiver, disc.sources.panels_by_flux(), 64, &mut rng).luminance());
+        let (mean, error) = sampled(1024, || from_panels(&disc, &receiver, 64, &mut rng).luminance());
         assert!((mean - exact).abs() < 5.0 * error + 1e-4 * exact, "{distance} m: {mean} +- {error} lx, not {exact}");
         assert!(error < 5e-3 * exact, "{distance} m: {error} of {exact}");
         let as_point = lux(&point, [0.0, -distance, 0.0], UP);
@@ -119,9 +118,7 @@ fn far_off_an_opening_lights_as_a_point() {
         for position in [[0.0, -20.0, 3.0], [15.0, -10.0, -8.0], [4.0, 18.0, 6.0]] {
             let normal = position.map(|x: f64| -x);
             let receiver = meter(&scene, position, normal);
-            let (mean, error) = sampled(128, || {
-                from_panels(&scene, &receiver, scene.sources.panels_by_flux(), 64, &mut rng).luminance()
-            });
+            let (mean, error) = sampled(128, || from_panels(&scene, &receiver, 64, &mut rng).luminance());
             let expected = lux(&point, position, normal);
             assert!(
                 (mean - expected).abs() < 5.0 * error + 1e-3 * expected,
@@ -153,14 +150,7 @@ fn the_lux_on_the_walls_of_a_closed_box_sum_up_to_the_flux_of_an_opening() {
             position[axis] = side * size[axis];
             let mut normal = [0.0; 3];
             normal[axis] = 1.0 - 2.0 * side;
-            all * from_panels(
-                &experiment.scene,
-                &meter(&experiment.scene, position, normal),
-                experiment.scene.sources.panels_by_flux(),
-                1,
-                &mut rng,
-            )
-            .luminance()
+            all * from_panels(&experiment.scene, &meter(&experiment.scene, position, normal), 1, &mut rng).luminance()
         });
         let flux = experiment.scene.sources.flux();
         assert!((mean - flux).abs() < 5.0 * error, "{shape}: {mean} +- {error} lm, not {flux}");

@@ -400,7 +400,7 @@ pub fn compare_both_ends(what: &str, paths: u32, of: impl Fn(&str) -> Experiment
     };
     for (a, b) in run("local", 512).iter().zip(&run("reverse", paths)) {
         let error = (a.standard_error * a.standard_error + b.standard_error * b.standard_error).sqrt();
-        // Fifteen comparisons in all at a family-wise 1e-6: 5.5 sigma of a normal, more of Student's t with some 60 degrees.
+        // Some thirty comparisons in all at a family-wise 1e-6: 5.5 sigma of a normal, more of Student's t with some 60 degrees.
         assert!((a.mean - b.mean).abs() < 6.5 * error, "{what}: {} against {}, error {error}", a.mean, b.mean);
         assert!(error < 0.02 * b.mean, "{what}: {error} of {}", b.mean);
     }
@@ -412,12 +412,20 @@ fn reflected_light_is_the_same_from_both_ends() {
         compare_both_ends(file, 1024, |job| boxed(&photometry(file), "point", 0.6, job));
     }
     let model = || closed_box(DVec3::new(3.0, 2.0, 4.0), &lambert(0.6, 0.0));
-    for kind in ["kind = \"cos_power\"\nexponent = 4.0", "kind = \"spot\"\ninner_degrees = 20.0\nouter_degrees = 50.0"]
-    {
-        let source = format!(
-            "[[source]]\nposition = [1.2, 1.1, 1.7]\ndirection = [0.3, -1.0, 0.2]\nintensity = 100.0\n{kind}\n"
-        );
-        compare_both_ends(kind, 1024, |job| Experiment::new(&format!("{job}{source}"), model()).unwrap());
+    let aimed = "direction = [0.3, -1.0, 0.2]";
+    let shining = "reflectance = 0.5\nflux = 100.0";
+    for (paths, kind) in [
+        (1024, format!("kind = \"cos_power\"\nexponent = 4.0\n{aimed}\nintensity = 100.0")),
+        (1024, format!("kind = \"spot\"\ninner_degrees = 20.0\nouter_degrees = 50.0\n{aimed}\nintensity = 100.0")),
+        (
+            8192,
+            format!("kind = \"rectangle\"\nalong = [1, 0, 0]\nsize = [0.8, 0.6]\ntwo_sided = true\n{aimed}\n{shining}"),
+        ),
+        (8192, format!("kind = \"disc\"\nradius = 0.4\n{aimed}\n{shining}")),
+        (8192, format!("kind = \"sphere\"\nradius = 0.3\n{shining}")),
+    ] {
+        let source = format!("[[source]]\nposition = [1.2, 1.1, 1.7]\n{kind}\n");
+        compare_both_ends(&kind, paths, |job| Experiment::new(&format!("{job}{source}"), model()).unwrap());
     }
 }
 

@@ -16,15 +16,15 @@ use crate::transport::connection::{Link, TILE};
 use crate::transport::continuation::{Continuation, continue_from, is_due};
 use crate::transport::neighbours::{GROUP, Neighbours};
 use crate::transport::receiver::Receiver;
-use crate::transport::shared::{LitPoints, Shared, direct_light};
+use crate::transport::shared::{Effort, LitPoints, Shared, direct_light};
 use rayon::prelude::*;
 use std::ops::Range;
 
 /// Histories that share a continuation of each receiver, where it has no neighbours to share points with and where it may have:
 /// chosen by measured figure of merit (docs/benchmarks.md).
 const HISTORIES_OF_A_PATH: [usize; 2] = [4, 16];
-/// Lights without extent that the points of continuations ask, where there are more: chosen by measured figure of merit.
-const LAMPS_OF_A_POINT: u64 = 8;
+/// What the points of continuations ask of direct light: chosen by measured figure of merit.
+const EFFORT: Effort = Effort { lamps: 8, samples: 4, of_sky: 1 };
 
 /// A receiver that is continued, with its paths in this batch.
 struct Continued {
@@ -135,8 +135,7 @@ impl Block<'_> {
         let counts = self.rule.orders.contains(&depth);
         let of_tile = |points: &mut [Point]| -> Vec<Link> {
             let mut there: Vec<_> = points.iter_mut().map(|(_, receiver, rng)| (*receiver, rng)).collect();
-            let what = (LAMPS_OF_A_POINT, self.rule.channels);
-            let direct = direct_light(self.scene, &mut there, &Shared::run(lit, group), 1, what);
+            let direct = direct_light(self.scene, &mut there, &Shared::run(lit, group), EFFORT, self.rule.channels);
             let link = |((path, receiver, _), direct): (&Point, Colour)| Link {
                 owner: *path,
                 receiver: *receiver,

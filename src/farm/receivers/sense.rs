@@ -12,7 +12,7 @@ use crate::scene::Scene;
 use crate::transport::direct::emitter_samples;
 use crate::transport::eye::{Eye, Gaze};
 use crate::transport::receiver::{Receiver, Seen, look_at};
-use crate::transport::shared::{LitPoints, Shared, TOGETHER, direct_light};
+use crate::transport::shared::{Effort, LitPoints, Shared, TOGETHER, direct_light};
 
 /// Histories of a batch for each point of an emitter that its receivers share: chosen by measured figure of merit
 /// (docs/benchmarks.md).
@@ -56,7 +56,7 @@ impl ReceiverSet {
 
     fn lit_points_of(&self, scene: &Scene, batch: u64, position: u64, count: u32) -> LitPoints {
         let index = batch * (u64::from(self.positions()) + 1) + position;
-        LitPoints::new(scene, PointSet::new(&self.emitters, index, count.ilog2()), count)
+        LitPoints::new(scene, &PointSet::new(&self.emitters, index, count.ilog2()), count)
     }
 
     /// Positions in a bin and batch.
@@ -88,7 +88,7 @@ impl ReceiverSet {
     ) -> Vec<Sensed> {
         let receivers: Vec<Option<Receiver>> = bins.iter().map(|&bin| meters[bin as usize]).collect();
         // Their light from lights without extent is the same in every batch.
-        let light = self.light(scene, &receivers, rngs, shared, (0, channels));
+        let light = self.light(scene, &receivers, rngs, shared, 0, channels);
         let sensed = |(receiver, direct): (Option<Receiver>, Colour)| {
             // In a scene without reflection there is nothing to wait for beyond direct light.
             Sensed { direct, receiver, behind: None, existed: receiver.is_some() && scene.reflects() }
@@ -112,10 +112,10 @@ impl ReceiverSet {
         for (stratum, shared) in (0..).zip(shared) {
             let seen = self.look(scene, bins, eye, stratum, rngs);
             let receivers: Vec<Option<Receiver>> = seen.iter().map(|s| s.receiver).collect();
-            let light = self.light(scene, &receivers, rngs, shared, (lamps, channels));
+            let light = self.light(scene, &receivers, rngs, shared, lamps, channels);
             let behind: Vec<Option<Receiver>> = seen.iter().map(|s| s.behind).collect();
             if behind.iter().any(Option::is_some) {
-                let through = self.light(scene, &behind, rngs, shared, (lamps, channels));
+                let through = self.light(scene, &behind, rngs, shared, lamps, channels);
                 sensed.iter_mut().zip(through).for_each(|(sensed, through)| sensed.direct += through);
             }
             for (i, (seen, light)) in seen.iter().zip(light).enumerate() {
@@ -159,12 +159,14 @@ impl ReceiverSet {
         receivers: &[Option<Receiver>],
         rngs: &mut [Generator],
         shared: &LitPoints,
-        what: (u64, usize),
+        lamps: u64,
+        channels: usize,
     ) -> Vec<Colour> {
         let samples = emitter_samples(self.histories).div_ceil(u64::from(self.positions()));
         let there = receivers.iter().zip(rngs).filter_map(|(r, rng)| Some(((*r)?, rng)));
         let mut there: Vec<(Receiver, &mut Generator)> = there.collect();
-        let mut light = direct_light(scene, &mut there, &Shared::all(shared), samples, what).into_iter();
+        let effort = Effort { lamps, samples, of_sky: samples };
+        let mut light = direct_light(scene, &mut there, &Shared::all(shared), effort, channels).into_iter();
         receivers.iter().map(|r| r.and_then(|_| light.next()).unwrap_or(Colour::BLACK)).collect()
     }
 }

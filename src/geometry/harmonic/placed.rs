@@ -96,6 +96,11 @@ impl Harmonic {
         off.to_cols_array().iter().all(|x| x.abs() <= 1e-12 * even * even).then_some(even)
     }
 
+    /// True of a ball.
+    pub fn is_round(&self) -> bool {
+        self.star.bounds.first == 0.0 && self.even().is_some()
+    }
+
     /// Its centre, the radius of a ball about that around it \[m\], and how much longer it is here than in its own coordinates, at most.
     pub fn around(&self) -> (DVec3, f64, f64) {
         // No direction is stretched by more than the root of the sum of squares of a matrix.

@@ -59,7 +59,7 @@ fn body(name: Named, lines: &[String], tilt_line: usize, comma: bool) -> Result<
                 tilt_line + 1,
                 "TILT",
                 value,
-                "NONE or INCLUDE (a table in a file of its own can be included)",
+                "NONE, or INCLUDE with the table of that file in the lines below this one",
             ));
         }
     };
