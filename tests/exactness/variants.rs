@@ -136,7 +136,9 @@ const VARIANTS: [Variant; 7] = [
 fn place() -> Place {
     let place = Place::new();
     let webs = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/luminaires");
-    OPENINGS.iter().for_each(|file| drop(fs::copy(webs.join(file), place.path(file)).unwrap()));
+    for file in OPENINGS {
+        fs::copy(webs.join(file), place.path(file)).unwrap();
+    }
     let scene = fs::read(place.path("room.glb")).unwrap();
     fs::write(place.path("floor.brdf"), FLOOR).unwrap();
     for (name, digit) in [("dull.glb", b'9'), ("peaked.glb", b'1')] {

@@ -137,11 +137,6 @@ impl Series {
         Series::new(&[[value, 0.0]]).expect("one finite coefficient")
     }
 
-    /// Instructions that sum it.
-    pub(super) fn path(&self) -> Path {
-        self.path
-    }
-
     /// N.
     pub fn degree(&self) -> usize {
         self.degree
