@@ -50,7 +50,7 @@ fn backward(scene: &Scene, mut ray: Ray, rng: &mut Generator, totals: &mut [f64]
 
 fn backward_estimates(scene: &Scene, eye: DVec3, target: DVec3, orders: usize) -> Vec<Estimate> {
     const BATCHES: u64 = 64;
-    const PATHS: u64 = 32768;
+    const PATHS: u64 = 8192;
     let stream = Stream::new(41, Domain::Receiver, "backward");
     let direction = (target - eye).normalize();
     let scores: Vec<Vec<f64>> = (0..BATCHES)
@@ -68,7 +68,7 @@ fn backward_estimates(scene: &Scene, eye: DVec3, target: DVec3, orders: usize) -
 fn orders_agree_with_a_backward_path_tracer() {
     let eyes = [[0.35, 0.9, 0.45], [0.8, 0.5, 0.45], [0.5, 0.2, 0.9]];
     let target = [0.35, 0.0, 0.45];
-    let mut job = "[run]\nhistories_per_batch = 32768\nbatches = 64\nseed = 42\n".to_owned();
+    let mut job = "[run]\nhistories_per_batch = 8192\nbatches = 64\nseed = 42\n".to_owned();
     for (i, eye) in eyes.iter().enumerate() {
         job += &spot_camera(&format!("c{i}"), *eye, target, [0.1, 0.2, 1.0]);
     }

@@ -13,7 +13,7 @@ use std::process::Command;
 const GOLDEN: (u32, &str, &str) = (
     5,
     "d4c1dc445ba9e0228a22b5906713d203bafca2dd6ca40df707ee6105c1e77a6b",
-    "deb74c2ff8bc6b684a6535786b6383609688b9cfc2a67e7293fb6277c2c78142",
+    "5456bbc8a26e751d3d9ce5fcf64e9260024e48c76f9973974b08120ef0d5ae35",
 );
 
 #[test]

@@ -84,7 +84,8 @@ fn a_luminous_sphere_gives_what_its_size_says_down_to_contact() {
     let all: Vec<_> = (estimates.iter().flatten().zip(places))
         .map(|(estimate, (distance, cosine))| {
             let expected = PI * luminance * cosine / (distance * distance);
-            compare(format!("E at {distance} radii"), *estimate, expected)
+            // Without noise; its points lie some micrometres above it.
+            compare(format!("E at {distance} radii"), *estimate, expected).within(2e-5)
         })
         .collect();
     assert_all(&all);

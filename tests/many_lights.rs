@@ -235,7 +235,7 @@ fn a_glossy_floor_sees_many_area_lights_as_paths_find_them() {
     };
     for (i, x) in [5.0, 5.6].into_iter().enumerate() {
         let receiver = receiver(x);
-        let chosen = of(&mut || from_emitters(scene, &receiver, 64, &mut rng).luminance(), 500, 1);
+        let chosen = of(&mut || from_emitters(scene, &receiver, 64, &mut rng).luminance(), 1000, 1);
         let job = Transport::default();
         let met = of(&mut || path(scene, &job, &receiver, &mut rng).direct.luminance(), 400, 500);
         let both = difference(i, chosen, met);

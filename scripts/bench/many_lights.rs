@@ -127,7 +127,7 @@ fn bulb(model: &mut Model, place: DVec3, flux: f64) {
     for corner in 0..8 {
         let sign = |bit: u32| if corner >> bit & 1 == 1 { -1.0 } else { 1.0 };
         let axes = [DVec3::X * sign(0), DVec3::Y * sign(1), DVec3::Z * sign(2)];
-        let even = (corner as u32).count_ones() % 2 == 0;
+        let even = (corner as u32).count_ones().is_multiple_of(2);
         let at = |i: u32, j: u32| {
             let share = |k: u32| f64::from(k) / f64::from(n);
             place + radius * (share(i) * axes[0] + share(j) * axes[1] + share(n - i - j) * axes[2]).normalize()

@@ -73,7 +73,8 @@ pub fn assert_all(all: &[Comparison]) {
     assert!(!all.is_empty(), "nothing was compared");
     for c in all {
         // Shown by --nocapture: how far from the limits a passing test is.
-        println!("{}: {} against {}, z = {:?}", c.name, c.estimate.mean, c.reference, c.z());
+        let share = 100.0 * c.estimate.standard_error / c.reference.abs();
+        println!("{}: {} against {}, z = {:?}, error {share:.3} %", c.name, c.estimate.mean, c.reference, c.z());
     }
     let failures = failures(all);
     assert!(failures.is_empty(), "{} of {} comparisons fail:\n{}", failures.len(), all.len(), failures.join("\n"));

@@ -40,7 +40,7 @@ fn what_is_wrong_in_lm_63_is_named() {
         ("320 324.619", "inf 324.619", "candela values (line 9) = inf"),
         ("320 324.619", "1e13 324.619", "candela values (line 9) = 1e13"),
         ("320 324.619", "320 324.619 7", "1 more numbers"),
-        ("TILT=NONE", "TILT=lamp.tlt", "TILT (line 4) = lamp.tlt: NONE or INCLUDE"),
+        ("TILT=NONE", "TILT=lamp.tlt", "TILT (line 4) = lamp.tlt: NONE, or INCLUDE with the table"),
         ("TILT=NONE", "TILT=INCLUDE", "pairs of angles and factors (line 5) = -1: 1 .. 1000"),
     ] {
         let message = refusal("full.ies", from, to);

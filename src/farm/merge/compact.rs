@@ -60,7 +60,7 @@ pub fn is_due(folder: &Folder, plan: &Plan, shards: u64) -> Result<bool> {
     let first = read_compaction(folder, plan)?.map_or(0, |header| header.shards());
     let n = plan.job.run.batches_per_shard;
     for shard in first..first.saturating_add(shards) {
-        if !read_header(&folder.shard_path(shard), plan, shard)?.is_some_and(|header| header.batches() == n) {
+        if read_header(&folder.shard_path(shard), plan, shard)?.is_none_or(|header| header.batches() != n) {
             return Ok(false);
         }
     }

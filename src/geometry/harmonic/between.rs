@@ -115,7 +115,7 @@ impl Harmonic {
     /// True when a segment crosses the surface.
     fn is_crossed(&self, shells: &Pair, segment: &Segment) -> bool {
         let Segment { part: [from, to], near, .. } = *segment;
-        if !shells.outer.blocks(from, to) && !(near == [true; 2] && self.is_within(segment)) {
+        if !(shells.outer.blocks(from, to) || near == [true; 2] && self.is_within(segment)) {
             return false;
         }
         shells.inner.blocks(from, to) || self.crosses(segment)
