@@ -63,6 +63,14 @@ def output_of(*command):
     return done.stdout
 
 
+def printed_by(*command):
+    """What a command says that ends with a code of chance: exrinfo 3.1.5 never sets it. It complains on its standard error."""
+    done = subprocess.run(command, capture_output=True, text=True)
+    if done.stderr:
+        sys.exit(f"{' '.join(map(str, command))}: {done.stderr}")
+    return done.stdout
+
+
 def word(pattern, text):
     found = re.search(pattern, text)
     if not found:
@@ -93,7 +101,7 @@ def check_headers(path, pixels):
         expect(found and found[1] == value, f"{path.name}: {name} is {found and found[1]}, not {value}")
     for line in ["compression): zip, multi-scanline blocks", "lineOrder): increasing y"]:
         expect(line in header, f"{path.name}: no {line}")
-    expect(" parts: 1\n" in output_of("exrinfo", "-v", str(path)), f"{path.name}: not one part in exrinfo")
+    expect(" parts: 1\n" in printed_by("exrinfo", "-v", str(path)), f"{path.name}: not one part in exrinfo")
 
     info = output_of("iinfo", "-v", "--stats", str(path))
     for name, value in ATTRIBUTES.items():
