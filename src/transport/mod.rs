@@ -48,6 +48,7 @@ pub mod direct;
 pub mod eye;
 pub mod lamps;
 pub mod neighbours;
+pub mod pool;
 pub mod receiver;
 pub mod reverse;
 pub mod shared;
