@@ -22,7 +22,7 @@ use std::ops::Range;
 
 /// Histories that share a continuation of each receiver, where it has no neighbours to share points with and where it may have:
 /// chosen by measured figure of merit (docs/benchmarks.md).
-const HISTORIES_OF_A_PATH: [usize; 2] = [4, 16];
+const HISTORIES_OF_A_PATH: [usize; 2] = [4, 32];
 /// Lights without extent that the points of continuations ask, where there are more: chosen by measured figure of merit.
 const LAMPS_OF_A_POINT: u64 = 8;
 
