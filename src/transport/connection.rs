@@ -247,17 +247,43 @@ impl Tile {
         if vertex.glossy.is_some() || self.varying.is_some() {
             return self.spread_varying::<I, C>(vertex, carrying, sums);
         }
-        let Carrying { factors, seen, bound, through } = *carrying;
+        match carrying.through {
+            None => self.spread_matt::<I, C>(vertex, carrying, sums),
+            Some(through) => self.spread_through::<I, C>(vertex, carrying, through, sums),
+        }
+    }
+
+    /// The same where both laws are matt and no veil is in the way.
+    #[inline(always)]
+    fn spread_matt<I: Isa, const C: usize>(&self, vertex: &Connector, carrying: &Carrying<C>, sums: &mut [Column; C]) {
+        let Carrying { factors, seen, bound, .. } = *carrying;
         let most = I::Sixteen::splat(bound);
         for bundle in 0..self.bundles().min(BUNDLES) {
             let carried = I::Sixteen::load(&factors[bundle]).min(most).select(u32::from(seen[bundle]));
             for c in 0..C {
                 let sum = I::Sixteen::load(&sums[c][bundle]);
-                let mut light = carried.mul(I::Sixteen::splat(vertex.intensity[c]));
-                if let Some(through) = through {
-                    light = light.mul(I::Sixteen::load(&through[c][bundle]));
-                }
-                sum.add(light).store(&mut sums[c][bundle]);
+                sum.add(carried.mul(I::Sixteen::splat(vertex.intensity[c]))).store(&mut sums[c][bundle]);
+            }
+        }
+    }
+
+    /// The same where veils let part of it `through`: a loop of its own, so that the other pays nothing for it.
+    #[inline(always)]
+    fn spread_through<I: Isa, const C: usize>(
+        &self,
+        vertex: &Connector,
+        carrying: &Carrying<C>,
+        through: &[Column; C],
+        sums: &mut [Column; C],
+    ) {
+        let Carrying { factors, seen, bound, .. } = *carrying;
+        let most = I::Sixteen::splat(bound);
+        for bundle in 0..self.bundles().min(BUNDLES) {
+            let carried = I::Sixteen::load(&factors[bundle]).min(most).select(u32::from(seen[bundle]));
+            for c in 0..C {
+                let sum = I::Sixteen::load(&sums[c][bundle]);
+                let light = carried.mul(I::Sixteen::splat(vertex.intensity[c]));
+                sum.add(light.mul(I::Sixteen::load(&through[c][bundle]))).store(&mut sums[c][bundle]);
             }
         }
     }
