@@ -69,6 +69,24 @@ fn local_and_reverse_agree_in_a_room_with_a_column() {
     assert_all(&local_against_reverse(&room(), &job, [(4096, 64), (2048, 64)]));
 }
 
+/// A camera of 3 x 1 pixels of which `target` is in the middle.
+fn strip(name: &str, eye: [f64; 3], target: [f64; 3]) -> String {
+    format!(
+        "[[camera]]\nname = \"{name}\"\neye = {eye:?}\ntarget = {target:?}\nvertical_fov_degrees = 2\n\
+         width = 3\nheight = 1\npixel_samples = 4\n"
+    )
+}
+
+#[test]
+fn pixels_across_an_edge_show_the_mean_of_what_is_on_both_sides() {
+    // The edge of the column before the wall, the one between two of its sides, and the floor in its shadow with its dark side.
+    let cameras = strip("silhouette", [1.5, 1.5, 1.0], [4.2, 1.4, 2.4])
+        + &strip("column", [1.5, 1.5, 1.2], [3.8, 1.4, 2.4])
+        + &strip("shadow", [5.4, 1.2, 3.5], [4.2, 0.0, 2.6]);
+    let job = omni([2.5, 2.4, 1.6], 80.0) + &cameras;
+    assert_all(&local_against_reverse(&room(), &job, [(512, 256), (2048, 64)]));
+}
+
 #[test]
 fn the_plain_local_estimate_agrees_with_reverse_too() {
     let job = omni([2.5, 2.4, 1.6], 80.0) + &room_receivers();

@@ -5,7 +5,13 @@ mod common;
 use common::scenes::{closed_box, cube_with_floor, lambert, point, spot_camera};
 use common::{Case, Comparison, Estimate, assert_all, compare, difference};
 use lampyris::math::{DVec3, PI};
+use lampyris::photometry::Colour;
+use lampyris::random::{Domain, Stream};
 use lampyris::scene::Model;
+use lampyris::transport::connection::{Connectors, Link};
+use lampyris::transport::pool::Pool;
+use lampyris::transport::receiver::{Receiver, Response};
+use lampyris::transport::trajectory::{Vertex, trace};
 use std::ops::Range;
 
 const ALL: Range<u32> = 0..u32::MAX;
@@ -55,4 +61,43 @@ fn the_error_falls_although_no_more_is_connected() {
     let model = || closed_box(DVec3::ONE, &lambert(0.5, 1.0 / PI));
     let [plain, thinned] = [1, 16].map(|thinning| indirect(&job(thinning), model(), ALL)[0].standard_error);
     assert!(thinned < 0.6 * plain, "{thinned} with thinning, {plain} without");
+}
+
+/// Lux-meters in a corner of the floor: some vertices are near, some behind them, some far.
+fn meters_in_a_corner() -> Vec<Receiver> {
+    let at = |i: usize| DVec3::new(0.02 + 0.06 * (i % 4) as f64, 0.0, 0.02 + 0.06 * (i / 4) as f64);
+    (0..16).map(|i| Receiver { position: at(i), normal: DVec3::Y, response: Response::Cosine }).collect()
+}
+
+#[test]
+fn what_a_tile_chooses_gives_on_average_what_all_vertices_give() {
+    const CHOICES: u64 = 400;
+    let case = Case::new(&(run(64, 1, 1) + &meters()), cube_with_floor(0.4, 0.5, 0.8));
+    let (scene, transport) = (&case.scene, &case.job.transport);
+    let mut vertices: Vec<Vertex> = Vec::new();
+    for i in 0..512 {
+        trace(scene, transport, &mut Stream::new(3, Domain::Trajectory, "").generator(i), &mut vertices);
+    }
+    let receivers = meters_in_a_corner();
+    let links: Vec<Link> = (0..)
+        .zip(&receivers)
+        .map(|(owner, &receiver)| Link { owner, receiver, start: Colour::BLACK, watched: false })
+        .collect();
+    let pool = Pool::new(scene, &vertices);
+    let mut all = Connectors::default();
+    all.push(scene, &vertices);
+    let truth = common::connect(scene, &all, 30.0, &receivers);
+    let found: Vec<Vec<f64>> = (0..CHOICES)
+        .map(|i| {
+            let mut rng = Stream::new(4, Domain::Choice, "corner").generator(i);
+            let chosen = pool.choose(&links, (200, 8), 30.0, &mut rng);
+            assert_eq!(chosen.histories(), 8);
+            common::connect(scene, &chosen, 30.0, &receivers).iter().map(|c| c.sum.luminance()).collect()
+        })
+        .collect();
+    let compared = |i: usize| {
+        let estimate = Estimate::from_scores(found.iter().map(|of| of[i]));
+        compare(format!("meter {i}"), estimate, truth[i].sum.luminance())
+    };
+    assert_all(&(0..receivers.len()).map(compared).collect::<Vec<_>>());
 }

@@ -10,10 +10,11 @@ mod continued;
 mod score;
 
 use super::receivers::{ReceiverSet, Sensed};
+use super::thinning::Histories;
 use crate::photometry::Colour;
 use crate::scene::Scene;
 use crate::tally::Scores;
-use crate::transport::connection::{Connected, Connectors, Link, Rule, TILE, Tile, connect};
+use crate::transport::connection::{Connected, Link, Rule, TILE, Tile, connect};
 use crate::transport::receiver::Receiver;
 use crate::transport::shared::LitPoints;
 use rayon::prelude::*;
@@ -30,7 +31,7 @@ pub fn score(
     scene: &Scene,
     order: &[u32],
     batch: u64,
-    histories: &Connectors,
+    histories: &Histories,
     (channels, orders): (usize, &Range<u32>),
 ) -> Scores {
     let rule = Rule { bound: set.bound(), channels, orders: orders.clone() };
@@ -50,7 +51,7 @@ pub fn score(
 struct Block<'a> {
     set: &'a ReceiverSet,
     scene: &'a Scene,
-    histories: &'a Connectors,
+    histories: &'a Histories,
     /// Points of emitters, for each position in a bin.
     shared: &'a [LitPoints],
     rule: &'a Rule,
@@ -63,10 +64,10 @@ impl Block<'_> {
     fn scores(&self) -> (Vec<Sensed>, Vec<Score>) {
         let sense = |bins: &[u32]| self.set.sense(self.scene, bins, self.batch, self.shared, self.rule.channels);
         let sensed: Vec<Sensed> = self.bins.par_chunks(TILE).flat_map_iter(sense).collect();
-        let all = self.histories.histories();
+        let all = self.histories.connectors.histories();
         let nothing = |&bin: &u32| Score::nothing(self.is_watched(bin).then_some(all));
         let mut scores: Vec<Score> = self.bins.iter().map(nothing).collect();
-        self.connect(self.links(&sensed), 0, 0..all, 0, &mut scores);
+        self.connect_receivers(self.links(&sensed), &mut scores);
         self.add_continuations(&sensed, &mut scores);
         scores.iter_mut().for_each(|score| score.finish(1.0 / all as f64));
         (sensed, scores)
@@ -84,8 +85,24 @@ impl Block<'_> {
             start: Colour::BLACK,
             watched: self.is_watched(self.bins[owner as usize]),
         };
-        let both = (0..).zip(sensed).flat_map(|(owner, s)| [s.receiver, s.behind].map(|receiver| (owner, receiver)));
-        both.filter_map(|(owner, receiver)| Some(link((owner, receiver?)))).collect()
+        (0..).zip(sensed).flat_map(|(owner, s)| s.receivers.iter().map(move |r| (owner, *r))).map(link).collect()
+    }
+
+    /// Connects the histories to `links`, the receivers themselves: of a pool each tile has vertices of its own.
+    fn connect_receivers(&self, links: Vec<Link>, scores: &mut [Score]) {
+        let Histories { connectors, pool } = self.histories;
+        let all = connectors.histories();
+        let Some(pool) = pool else { return self.connect(links, 0, 0..all, 0, scores) };
+        let of_tile = |links: &[Link]| {
+            let tile = Tile::new(self.scene, links.to_vec(), 0);
+            let mut rng = self.set.choice(self.bins[links[0].owner as usize], self.batch);
+            let own = pool.choose(links, (connectors.vertices(), all), self.rule.bound, &mut rng);
+            connect(self.scene, &own, 0..all, &tile, self.rule)
+        };
+        let connected: Vec<Vec<Connected>> = links.par_chunks(TILE).map(of_tile).collect();
+        for (link, connected) in links.iter().zip(connected.into_iter().flatten()) {
+            scores[link.owner as usize].add(&connected, 0, 0);
+        }
     }
 
     /// Connects `histories` to `links`, which lie `depth` reflections before the receivers, and adds that to the scores of the
@@ -93,7 +110,7 @@ impl Block<'_> {
     fn connect(&self, links: Vec<Link>, depth: u32, histories: Range<usize>, first: usize, scores: &mut [Score]) {
         let of_tile = |links: &[Link]| {
             let tile = Tile::new(self.scene, links.to_vec(), depth);
-            connect(self.scene, self.histories, histories.clone(), &tile, self.rule)
+            connect(self.scene, &self.histories.connectors, histories.clone(), &tile, self.rule)
         };
         let connected: Vec<Vec<Connected>> = links.par_chunks(TILE).map(of_tile).collect();
         for (link, connected) in links.iter().zip(connected.into_iter().flatten()) {

@@ -8,7 +8,7 @@
 use super::local;
 use super::receivers::{CentreSight, ReceiverSet};
 use super::regions::{Regions, Seen};
-use super::thinning::Thinning;
+use super::thinning::{Histories, Thinning};
 use crate::geometry::kd_order;
 use crate::job::{Channels, Estimator, Job, Sampling};
 use crate::random::sobol::PointSet;
@@ -25,6 +25,10 @@ const TRAJECTORIES_AT_ONCE: u64 = 64;
 
 /// Trajectories traced before their vertices are thinned, all threads together.
 const WAVE: u64 = 1024;
+
+/// Vertices kept for each that a tile of receivers is connected to, at most: chosen by measured figure of merit
+/// (docs/benchmarks.md).
+const MOST_KEPT: u64 = 8;
 
 /// Everything that is the same for every batch of a job.
 pub struct Realization<'a> {
@@ -96,7 +100,7 @@ impl<'a> Realization<'a> {
 
     /// Scores by connections from trajectories to receivers.
     fn local(&self, index: u64) -> (Vec<Scores>, FluxBalance) {
-        let (histories, flux) = self.connectors(index);
+        let (histories, flux) = self.histories(index);
         let sets = self.sets.par_iter().zip(&self.orders_of_bins);
         let channels = if self.job.run.channels == Channels::Rgb { 3 } else { 1 };
         let rule = (channels, &self.orders);
@@ -126,17 +130,18 @@ impl<'a> Realization<'a> {
         (sets.map(count).collect(), flux)
     }
 
-    /// The histories of a batch as connectors.
-    fn connectors(&self, index: u64) -> (Connectors, FluxBalance) {
+    /// The histories of a batch.
+    fn histories(&self, index: u64) -> (Histories, FluxBalance) {
         let count = self.job.run.trajectories_per_batch();
         if self.job.run.thinning == 1 {
             let traced = self.trace::<Vertex>(index, 0..count);
             let mut connectors = Connectors::default();
             traced.iter().flat_map(Traced::histories).for_each(|vertices| connectors.push(self.scene, vertices));
-            return (connectors, balance(&traced));
+            return (Histories { connectors, pool: None }, balance(&traced));
         }
         let mut flux = FluxBalance::default();
-        let mut thinning = Thinning::new(self.scene, self.job.run.thinning, self.thinning.generator(index));
+        let kept = self.job.run.thinning.min(MOST_KEPT);
+        let mut thinning = Thinning::new(self.scene, (self.job.run.thinning, kept), self.thinning.generator(index));
         for start in (0..count).step_by(WAVE as usize) {
             let traced = self.trace::<Vertex>(index, start..(start + WAVE).min(count));
             flux.add(&balance(&traced));

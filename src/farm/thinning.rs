@@ -12,7 +12,8 @@
 use crate::math::DVec3;
 use crate::random::Generator;
 use crate::scene::Scene;
-use crate::transport::connection::Connectors;
+use crate::transport::connection::{Connectors, dealing};
+use crate::transport::pool::Pool;
 use crate::transport::trajectory::Vertex;
 use rayon::prelude::*;
 
@@ -23,10 +24,21 @@ const STEPS: f64 = 1024.0;
 /// Bits of the number of a vertex below its key.
 const NUMBER: u32 = 30;
 
+/// What receivers are connected to in a batch.
+#[derive(Debug)]
+pub struct Histories {
+    /// Vertices that every tile may be connected to.
+    pub connectors: Connectors,
+    /// More of them, from which a tile chooses as many; none where all are connected.
+    pub pool: Option<Pool>,
+}
+
 /// The vertices of a batch on their way through the choice.
 pub struct Thinning<'a> {
     scene: &'a Scene,
     thinning: usize,
+    /// Vertices that are kept for each that a tile is connected to.
+    kept: usize,
     rng: Generator,
     /// Not chosen from yet.
     waiting: Vec<Vertex>,
@@ -34,9 +46,16 @@ pub struct Thinning<'a> {
 }
 
 impl<'a> Thinning<'a> {
-    /// One of `thinning` vertices will be chosen, from random starts drawn from `rng`.
-    pub fn new(scene: &'a Scene, thinning: u64, rng: Generator) -> Self {
-        Thinning { scene, thinning: thinning as usize, rng, waiting: Vec::new(), chosen: Vec::new() }
+    /// One of `thinning` vertices will be chosen, and `kept` times as many kept to choose from, from random starts drawn from `rng`.
+    pub fn new(scene: &'a Scene, (thinning, kept): (u64, u64), rng: Generator) -> Self {
+        Thinning {
+            scene,
+            thinning: thinning as usize,
+            kept: kept as usize,
+            rng,
+            waiting: Vec::new(),
+            chosen: Vec::new(),
+        }
     }
 
     /// Takes in the vertices of the next trajectories.
@@ -47,23 +66,27 @@ impl<'a> Thinning<'a> {
         }
     }
 
-    /// The connectors of `histories` that stand for all that was taken in.
-    pub fn finish(mut self, histories: u64) -> Connectors {
+    /// What stands for all that was taken in, as so many `histories`.
+    pub fn finish(mut self, histories: u64) -> Histories {
         self.choose();
+        let (kept, histories) = (self.kept, histories as usize);
+        let offset = if kept > 1 { self.rng.below(kept as u32) as usize } else { 0 };
+        let heavier = |v: &Vertex| Vertex { weight: v.weight * kept as f64, ..*v };
+        let some: Vec<Vertex> = self.chosen.iter().skip(offset).step_by(kept).map(heavier).collect();
         let mut connectors = Connectors::default();
-        for first in 0..histories as usize {
-            // In turn, so that each history holds vertices from everywhere.
-            let own: Vec<Vertex> = self.chosen.iter().skip(first).step_by(histories as usize).copied().collect();
+        for first in dealing(histories) {
+            // In turn, so that each history holds vertices from everywhere, and so do the few that share a continuation.
+            let own: Vec<Vertex> = some.iter().skip(first).step_by(histories).copied().collect();
             connectors.push(self.scene, &own);
         }
-        connectors
+        Histories { connectors, pool: (kept > 1).then(|| Pool::new(self.scene, &self.chosen)) }
     }
 
     /// Chooses from those that wait, with the weight of all for which each stands, over `thinning`.
     fn choose(&mut self) {
         let order = order(self.scene, &self.waiting);
         let fluxes: Vec<f64> = order.par_iter().map(|&i| worth(self.scene, &self.waiting[i])).collect();
-        let wanted = self.waiting.len().div_ceil(self.thinning);
+        let wanted = self.waiting.len().div_ceil(self.thinning) * self.kept;
         let step = fluxes.iter().sum::<f64>() / wanted as f64;
         // Nothing, or less light than a number can tell from nothing.
         if step >= f64::MIN_POSITIVE {

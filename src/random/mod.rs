@@ -36,6 +36,8 @@ pub enum Domain {
     Emitter,
     /// Scrambling of the first directions of receiver-side continuations; the index is `batch * bins + bin`.
     Direction,
+    /// Which vertices the tiles of one receiver set are connected to; the index is `batch * bins + bin` of their first bin.
+    Choice,
     /// Paths from the receivers of one receiver set; the index is `batch * bins + bin`.
     Reverse,
     /// Batches that an audit computes again; the index is 0.
@@ -53,6 +55,7 @@ impl Domain {
             Domain::Thinning => "lampyris 1 thinning",
             Domain::Emitter => "lampyris 1 emitter",
             Domain::Direction => "lampyris 1 direction",
+            Domain::Choice => "lampyris 1 choice",
             Domain::Reverse => "lampyris 1 reverse",
             Domain::Audit => "lampyris 1 audit",
         }

@@ -29,7 +29,7 @@ use crate::photometry::Colour;
 use crate::scene::{Scene, weights_over_tolerated};
 use std::ops::Range;
 
-pub use super::connectors::{Connectors, LitPoint};
+pub use super::connectors::{Connectors, LitPoint, dealing};
 pub use crate::geometry::visibility::TILE;
 
 /// Squared lengths below this are taken for it: a receiver there is at the vertex itself \[m2\].

@@ -6,6 +6,23 @@ use crate::photometry::Colour;
 use crate::scene::{LawInLanes, Scene};
 use std::ops::Range;
 
+/// The golden section.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
+/// The numbers 0 .. `count` in an order of which any run is spread evenly over them.
+pub fn dealing(count: usize) -> impl Iterator<Item = usize> {
+    let gcd = |mut a: usize, mut b: usize| {
+        while b > 0 {
+            (a, b) = (b, a % b);
+        }
+        a
+    };
+    // Without a common divisor with `count`, the multiples of a number meet all others.
+    let golden = (count as f64 * GOLDEN) as usize;
+    let stride = (golden..=count).find(|&n| gcd(n, count) == 1).unwrap_or(1);
+    std::iter::successors(Some(0), move |at| Some((at + stride) % count)).take(count)
+}
+
 /// A vertex as the kernel wants it.
 #[derive(Clone, Debug)]
 pub(super) struct Connector {
@@ -22,6 +39,18 @@ pub(super) struct Connector {
     pub(super) glossy: Option<Box<GlossyConnector>>,
     /// Number of the emitter of which this is a point and no vertex.
     pub(super) emitter: Option<u32>,
+}
+
+impl Connector {
+    /// The same vertex, of which all light counts `factor` times.
+    fn weighted(&self, factor: f32) -> Connector {
+        let mut weighted = self.clone();
+        weighted.intensity = weighted.intensity.map(|c| c * factor);
+        if let Some(glossy) = &mut weighted.glossy {
+            glossy.weight = glossy.weight.map(|c| c * factor);
+        }
+        weighted
+    }
 }
 
 /// What a vertex of a law that depends on direction has besides.
@@ -96,6 +125,24 @@ impl Connectors {
     /// Number of vertices.
     pub fn vertices(&self) -> usize {
         self.all.len()
+    }
+
+    /// Position and normal of each vertex.
+    pub(super) fn places(&self) -> impl Iterator<Item = (Vec3, Vec3)> {
+        self.all.iter().map(|vertex| (vertex.position, vertex.normal))
+    }
+
+    /// The vertices with the numbers `chosen`, each with a factor of its weight, dealt in turn to so many histories, of which any few that
+    /// follow each other hold some from everywhere.
+    pub(super) fn dealt(&self, chosen: &[(usize, f32)], histories: usize) -> Connectors {
+        let mut dealt = Connectors { mirrored: self.mirrored, ..Connectors::default() };
+        for first in dealing(histories) {
+            for &(number, factor) in chosen.iter().skip(first).step_by(histories) {
+                dealt.all.push(self.all[number].weighted(factor));
+            }
+            dealt.ends.push(dealt.all.len());
+        }
+        dealt
     }
 
     pub(super) fn iter(&self, histories: Range<usize>) -> impl Iterator<Item = &[Connector]> {

@@ -48,6 +48,7 @@ pub mod direct;
 pub mod eye;
 pub mod lamps;
 pub mod neighbours;
+pub mod pool;
 mod projected_cap;
 pub mod receiver;
 pub mod reverse;

@@ -41,7 +41,8 @@ impl Receiver {
         chosen.weighted(1.0 / probability)
     }
 
-    fn weighted(mut self, factor: f64) -> Receiver {
+    /// The same receiver, of which all light counts `factor` times.
+    pub fn weighted(mut self, factor: f64) -> Receiver {
         if let Response::Reflectance { attenuation, .. } = &mut self.response {
             *attenuation *= factor;
         }

@@ -46,12 +46,12 @@ type Point = (u32, Receiver, Generator);
 impl Block<'_> {
     /// Draws the continuations of the receivers that need them, and adds the light that comes by them.
     pub(super) fn add_continuations(&self, sensed: &[Sensed], scores: &mut [Score]) {
-        let all = self.histories.histories();
+        let all = self.histories.connectors.histories();
         let may_share = self.may_share();
         let groups = (all / HISTORIES_OF_A_PATH[usize::from(may_share)]).max(1);
         let of_bin = |i: usize| {
-            let both = [sensed[i].receiver, sensed[i].behind].into_iter().flatten();
-            both.filter_map(move |receiver| self.continued(receiver, i, groups))
+            let receivers = sensed[i].receivers.iter().enumerate();
+            receivers.filter_map(move |(number, receiver)| self.continued(receiver, (i, number), groups))
         };
         let mut continued: Vec<Continued> = (0..sensed.len()).into_par_iter().flat_map_iter(of_bin).collect();
         if continued.is_empty() {
@@ -77,13 +77,13 @@ impl Block<'_> {
         }
     }
 
-    /// A receiver of the bin number `owner` of the block, if it is continued.
-    fn continued(&self, receiver: Receiver, owner: usize, groups: usize) -> Option<Continued> {
+    /// The `receiver` of that number of the bin number `owner` of the block, if it is continued.
+    fn continued(&self, receiver: &Receiver, (owner, number): (usize, usize), groups: usize) -> Option<Continued> {
         let bin = self.bins[owner];
-        is_due(self.scene, &receiver, self.rule.bound).then(|| Continued {
+        is_due(self.scene, receiver, self.rule.bound).then(|| Continued {
             owner: owner as u32,
-            receiver,
-            paths: self.set.continuations(bin, self.batch, groups),
+            receiver: *receiver,
+            paths: self.set.continuations((bin, number), self.batch, groups),
             watched: self.is_watched(bin),
         })
     }

@@ -35,7 +35,8 @@ impl Score {
     /// Takes in what the histories from `first` on give a link that lies `depth` reflections before the receiver.
     pub fn add(&mut self, connected: &Connected, depth: u32, first: usize) {
         self.connected += connected.sum;
-        self.peak = self.peak.max(connected.peak);
+        // Of several receivers of a bin one history has at most the sum.
+        self.peak = if depth == 0 { self.peak + connected.peak } else { self.peak.max(connected.peak) };
         self.mirrored += connected.mirrored;
         if depth > 0 {
             self.continued += connected.sum.luminance();

@@ -4,6 +4,7 @@
 //! drawn anew each batch, carries the connections. A lux-meter stays where it is, and its direct light from lights
 //! without extent is computed once. How histories are turned into scores is in [`super::local`].
 
+mod edges;
 mod horizon;
 mod sense;
 mod sight;
@@ -26,6 +27,7 @@ use crate::transport::eye::{Eye, Gaze, latitude};
 use crate::transport::lamps::all;
 use crate::transport::receiver::{Receiver, Response, Seen, look, look_at};
 use crate::transport::shared::of_lights;
+use edges::across_edges;
 use horizon::Sight;
 
 /// One receiver set of a job, placed in a scene.
@@ -39,6 +41,8 @@ pub struct ReceiverSet {
     continuations: Stream,
     /// Of the directions in which they start.
     directions: Stream,
+    /// Of the vertices that tiles choose.
+    choices: Stream,
     histories: u64,
     /// Whether the job asks for quasi-random histories: continuations follow.
     quasi_random: bool,
@@ -46,6 +50,8 @@ pub struct ReceiverSet {
     bound: f64,
     /// Where each bin lies, of a surface point seen from all directions; empty for others.
     sights: Vec<Sight>,
+    /// Whether each bin lies across an edge, of what is seen from a place; empty for others.
+    edges: Vec<bool>,
 }
 
 /// What the bins are.
@@ -66,6 +72,9 @@ pub struct Paths {
     points: Option<PointSet>,
     next: u32,
 }
+
+/// Distance between the numbers of the receivers of a bin: no job has so many bins and batches.
+const BETWEEN_RECEIVERS: u64 = 1 << 58;
 
 /// Quasi-random coordinates of a path: two directions at matt surfaces.
 const COORDINATES: usize = 4;
@@ -104,16 +113,17 @@ impl ReceiverSet {
         }
         let bound = |set: usize| bounds.get(set).copied().unwrap_or(f64::INFINITY);
         let sets = job.sets().into_iter().zip(bins).enumerate();
-        sets.map(|(i, (shape, bins))| ReceiverSet::new(job, shape, bins, bound(i))).collect()
+        sets.map(|(i, (shape, bins))| ReceiverSet::new(job, scene, (shape, bins), bound(i))).collect()
     }
 
-    fn new(job: &Job, shape: SetShape, bins: Bins, bound: f64) -> Self {
+    fn new(job: &Job, scene: &Scene, (shape, bins): (SetShape, Bins), bound: f64) -> Self {
         let stream = Stream::new(job.run.seed, Domain::Receiver, &shape.name);
         let emitters = Stream::new(job.run.seed, Domain::Emitter, &shape.name);
         let continuations = Stream::new(job.run.seed, Domain::Continuation, &shape.name);
         let directions = Stream::new(job.run.seed, Domain::Direction, &shape.name);
         let histories = job.run.histories_per_batch;
         let quasi_random = job.run.sampling == Sampling::Rqmc;
+        let choices = Stream::new(job.run.seed, Domain::Choice, &shape.name);
         let mut set = ReceiverSet {
             shape,
             bins,
@@ -121,13 +131,19 @@ impl ReceiverSet {
             emitters,
             continuations,
             directions,
+            choices,
             histories,
             quasi_random,
             bound,
             sights: Vec::new(),
+            edges: Vec::new(),
         };
-        if let Bins::Film { eye: eye @ Eye::Surface { point }, .. } = &set.bins {
-            set.sights = (0..set.shape.bins()).map(|i| set.sight(eye, point.normal, i)).collect();
+        match &set.bins {
+            Bins::Film { eye: eye @ Eye::Surface { point }, .. } => {
+                set.sights = (0..set.shape.bins()).map(|i| set.sight(eye, point.normal, i)).collect();
+            }
+            Bins::Film { eye, .. } => set.edges = across_edges(scene, eye, (set.shape.width, set.shape.height)),
+            Bins::Meters(_) => {}
         }
         set
     }
@@ -142,12 +158,17 @@ impl ReceiverSet {
         self.bound
     }
 
-    /// The paths that continue bin `bin` in a batch, `count` in number.
-    pub fn continuations(&self, bin: u32, batch: u64, count: usize) -> Paths {
-        let index = batch * self.shape.bins() as u64 + u64::from(bin);
+    /// The paths that continue receiver number `receiver` of bin `bin` in a batch, `count` in number.
+    pub fn continuations(&self, (bin, receiver): (u32, usize), batch: u64, count: usize) -> Paths {
+        let index = batch * self.shape.bins() as u64 + u64::from(bin) + receiver as u64 * BETWEEN_RECEIVERS;
         let points = (self.quasi_random && count.is_power_of_two())
             .then(|| PointSet::new(&self.directions, index, count.ilog2()));
         Paths { rng: self.continuations.generator(index), points, next: 0 }
+    }
+
+    /// The numbers by which the tile that begins with `bin` chooses its vertices in a batch.
+    pub fn choice(&self, bin: u32, batch: u64) -> Generator {
+        self.choices.generator(batch * self.shape.bins() as u64 + u64::from(bin))
     }
 
     /// Where the centre of bin `i` looks, for the order of the tiles alone; infinite where nothing is seen.
@@ -236,9 +257,8 @@ impl ReceiverSet {
         DVec2::new(x, y)
     }
 
-    /// A film position of bin `bin`: in its stratum, or across the horizon anywhere in the bin, but above.
-    fn draw(&self, eye: &Eye, stratum: u32, bin: usize, rng: &mut Generator) -> DVec2 {
-        let strata = self.positions().isqrt();
+    /// A film position of bin `bin`: in its stratum of `strata` x `strata`, or across the horizon anywhere in the bin, but above.
+    fn draw(&self, eye: &Eye, (strata, stratum): (u32, u32), bin: usize, rng: &mut Generator) -> DVec2 {
         if self.sights.get(bin) != Some(&Sight::Across) {
             return self.film(bin, strata, stratum, rng.uniform2());
         }
@@ -259,7 +279,7 @@ impl ReceiverSet {
             Bins::Film { eye, strata } => {
                 let mut rng = self.stream.generator(bin as u64);
                 let stratum = rng.below(strata * strata);
-                let film = self.draw(eye, stratum, bin, &mut rng);
+                let film = self.draw(eye, (*strata, stratum), bin, &mut rng);
                 gaze(scene, eye, film, &mut rng).receiver
             }
         }

@@ -54,7 +54,7 @@ impl ReceiverSet {
         match &self.bins {
             Bins::Meters(meters) => (Colour::BLACK, meters[bin]),
             Bins::Film { eye, .. } => {
-                let film = self.draw(eye, stratum, bin, rng);
+                let film = self.draw(eye, (self.positions().isqrt(), stratum), bin, rng);
                 let seen = gaze(scene, eye, film, rng);
                 let receiver = seen.receiver.map(|r| r.on_one_side(scene, rng));
                 let lit = receiver.map_or(Colour::BLACK, |r| lights_at(scene, &r));

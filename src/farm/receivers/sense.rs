@@ -5,6 +5,7 @@
 
 use super::{Bins, ReceiverSet, gaze_ray};
 use crate::geometry::Ray;
+use crate::math::DVec2;
 use crate::photometry::Colour;
 use crate::random::Generator;
 use crate::random::sobol::PointSet;
@@ -13,6 +14,7 @@ use crate::transport::direct::emitter_samples;
 use crate::transport::eye::{Eye, Gaze};
 use crate::transport::receiver::{Receiver, Seen, look_at};
 use crate::transport::shared::{Effort, LitPoints, Shared, TOGETHER, direct_light};
+use smallvec::SmallVec;
 
 /// Histories of a batch for each point of an emitter that its receivers share: chosen by measured figure of merit
 /// (docs/benchmarks.md).
@@ -22,21 +24,30 @@ const HISTORIES_OF_A_POINT: u64 = 2;
 const HISTORIES_OF_A_LAMP: u64 = 1;
 const LEAST_LAMPS: u64 = 4;
 
+/// Parts along each side into which the strata of a bin across an edge are divided, a position in each, and the positions of
+/// such a bin that carry connections: chosen in the same way.
+const PARTS: u32 = 2;
+const CARRIERS: u32 = 4;
+
+/// Least weight of a position in the choice of carriers, so that none is left out whatever its law \[1/sr\].
+const LEAST_WORTH: f64 = 1e-3;
+
 /// What the positions of one bin say in one batch.
 pub struct Sensed {
     /// Emission and sampled direct light \[lx or cd/m2\].
     pub direct: Colour,
-    /// Where the histories are connected to.
-    pub receiver: Option<Receiver>,
-    /// The same for light that arrives on the other side of an opal surface.
-    pub behind: Option<Receiver>,
+    /// Where the histories are connected to: points, on opal surfaces both sides of them.
+    pub receivers: Receivers,
     /// Whether a surface that reflects was there.
     pub existed: bool,
 }
 
+/// The receivers of a bin.
+pub type Receivers = SmallVec<[Receiver; 1]>;
+
 impl Sensed {
     fn nothing() -> Self {
-        Sensed { direct: Colour::BLACK, receiver: None, behind: None, existed: false }
+        Sensed { direct: Colour::BLACK, receivers: Receivers::new(), existed: false }
     }
 }
 
@@ -88,10 +99,12 @@ impl ReceiverSet {
     ) -> Vec<Sensed> {
         let receivers: Vec<Option<Receiver>> = bins.iter().map(|&bin| meters[bin as usize]).collect();
         // Their light from lights without extent is the same in every batch.
-        let light = self.light(scene, &receivers, rngs, shared, 0, channels);
+        let mut rngs: Vec<&mut Generator> = rngs.iter_mut().collect();
+        let light = self.light(scene, &receivers, &mut rngs, shared, (0, channels));
         let sensed = |(receiver, direct): (Option<Receiver>, Colour)| {
             // In a scene without reflection there is nothing to wait for beyond direct light.
-            Sensed { direct, receiver, behind: None, existed: receiver.is_some() && scene.reflects() }
+            let existed = receiver.is_some() && scene.reflects();
+            Sensed { direct, receivers: receiver.into_iter().collect(), existed }
         };
         receivers.into_iter().zip(light).map(sensed).collect()
     }
@@ -109,36 +122,89 @@ impl ReceiverSet {
         let lamps = (self.histories / (HISTORIES_OF_A_LAMP * u64::from(positions))).max(LEAST_LAMPS);
         let carrying: Vec<u32> = rngs.iter_mut().map(|rng| rng.below(positions)).collect();
         let mut sensed: Vec<Sensed> = bins.iter().map(|_| Sensed::nothing()).collect();
+        let mut seen_across: Vec<Vec<Seen>> = vec![Vec::new(); bins.len()];
         for (stratum, shared) in (0..).zip(shared) {
-            let seen = self.look(scene, bins, eye, stratum, rngs);
-            let receivers: Vec<Option<Receiver>> = seen.iter().map(|s| s.receiver).collect();
-            let light = self.light(scene, &receivers, rngs, shared, lamps, channels);
-            let behind: Vec<Option<Receiver>> = seen.iter().map(|s| s.behind).collect();
-            if behind.iter().any(Option::is_some) {
-                let through = self.light(scene, &behind, rngs, shared, lamps, channels);
-                sensed.iter_mut().zip(through).for_each(|(sensed, through)| sensed.direct += through);
-            }
-            for (i, (seen, light)) in seen.iter().zip(light).enumerate() {
-                sensed[i].direct += seen.emitted + light;
-                sensed[i].existed |= seen.receiver.is_some();
-                if stratum == carrying[i] {
-                    (sensed[i].receiver, sensed[i].behind) = (seen.receiver, seen.behind);
+            for part in 0..PARTS * PARTS {
+                let what = (lamps, channels);
+                for (i, seen, light) in self.sense_part(scene, bins, eye, (stratum, part), rngs, (shared, what)) {
+                    let sensed = &mut sensed[i];
+                    sensed.direct += (seen.emitted + light) / self.positions_of(bins[i]);
+                    sensed.existed |= seen.receiver.is_some();
+                    if self.is_across(bins[i]) {
+                        seen_across[i].push(seen);
+                    } else if stratum == carrying[i] {
+                        sensed.receivers.extend([seen.receiver, seen.behind].into_iter().flatten());
+                    }
                 }
             }
         }
-        sensed.iter_mut().for_each(|s| s.direct = s.direct / f64::from(positions));
+        for (i, seen) in seen_across.into_iter().enumerate().filter(|(_, seen)| !seen.is_empty()) {
+            sensed[i].receivers = carriers(scene, &seen, &mut rngs[i]);
+        }
         sensed
     }
 
-    /// What an eye sees at a position in one stratum of each bin.
-    fn look(&self, scene: &Scene, bins: &[u32], eye: &Eye, stratum: u32, rngs: &mut [Generator]) -> Vec<Seen> {
-        let draw = |(&bin, rng): (&u32, &mut Generator)| eye.gaze(self.draw(eye, stratum, bin as usize, rng));
+    /// What is seen in one part of one stratum, and the direct light there: of all bins in the first part, of those across an edge in the
+    /// others; with the place of each in `bins`.
+    fn sense_part(
+        &self,
+        scene: &Scene,
+        bins: &[u32],
+        eye: &Eye,
+        (stratum, part): (u32, u32),
+        rngs: &mut [Generator],
+        (shared, what): (&LitPoints, (u64, usize)),
+    ) -> Vec<(usize, Seen, Colour)> {
+        let asked = |i: &usize| part == 0 || self.is_across(bins[*i]);
+        let places: Vec<usize> = (0..bins.len()).filter(asked).collect();
+        if places.is_empty() {
+            return Vec::new();
+        }
+        let of_places = (0..).zip(rngs).filter(|(i, _)| asked(i));
+        let mut rngs: Vec<&mut Generator> = of_places.map(|(_, rng)| rng).collect();
+        let some: Vec<u32> = places.iter().map(|&i| bins[i]).collect();
+        let seen = self.look(scene, &some, eye, (stratum, part), &mut rngs);
+        let receivers: Vec<Option<Receiver>> = seen.iter().map(|s| s.receiver).collect();
+        let mut light = self.light(scene, &receivers, &mut rngs, shared, what);
+        let behind: Vec<Option<Receiver>> = seen.iter().map(|s| s.behind).collect();
+        if behind.iter().any(Option::is_some) {
+            let through = self.light(scene, &behind, &mut rngs, shared, what);
+            light.iter_mut().zip(through).for_each(|(light, through)| *light += through);
+        }
+        places.into_iter().zip(seen).zip(light).map(|((i, seen), light)| (i, seen, light)).collect()
+    }
+
+    /// True where the bin lies across an edge.
+    fn is_across(&self, bin: u32) -> bool {
+        self.edges.get(bin as usize) == Some(&true)
+    }
+
+    /// Positions in `bin` and batch.
+    fn positions_of(&self, bin: u32) -> f64 {
+        let parts = if self.is_across(bin) { PARTS * PARTS } else { 1 };
+        f64::from(self.positions() * parts)
+    }
+
+    /// The film position of `bin` in a part of a stratum.
+    fn place(&self, eye: &Eye, bin: u32, (stratum, part): (u32, u32), rng: &mut Generator) -> DVec2 {
+        let strata = self.positions().isqrt();
+        if !self.is_across(bin) {
+            return self.draw(eye, (strata, stratum), bin as usize, rng);
+        }
+        let finer = strata * PARTS;
+        let (column, row) = (stratum % strata * PARTS + part % PARTS, stratum / strata * PARTS + part / PARTS);
+        self.draw(eye, (finer, row * finer + column), bin as usize, rng)
+    }
+
+    /// What an eye sees at a position in a part of one stratum of each bin.
+    fn look(&self, scene: &Scene, bins: &[u32], eye: &Eye, part: (u32, u32), rngs: &mut [&mut Generator]) -> Vec<Seen> {
+        let draw = |(&bin, rng): (&u32, &mut &mut Generator)| eye.gaze(self.place(eye, bin, part, rng));
         let gazes: Vec<Gaze> = bins.iter().zip(&mut *rngs).map(draw).collect();
         let rays: Vec<Ray> = gazes.iter().filter_map(gaze_ray).collect();
         let mut hits = vec![None; rays.len()];
         scene.geometry.closest_hits(&rays, &mut hits);
         let mut hits = hits.into_iter();
-        let mut see = |(gaze, rng): (&Gaze, &mut Generator)| {
+        let mut see = |(gaze, rng): (&Gaze, &mut &mut Generator)| {
             let (hit, direction) = match gaze {
                 Gaze::Along(ray) => (hits.next().flatten(), ray.direction),
                 Gaze::At(hit, direction) => (Some(*hit), *direction),
@@ -157,16 +223,41 @@ impl ReceiverSet {
         &self,
         scene: &Scene,
         receivers: &[Option<Receiver>],
-        rngs: &mut [Generator],
+        rngs: &mut [&mut Generator],
         shared: &LitPoints,
-        lamps: u64,
-        channels: usize,
+        (lamps, channels): (u64, usize),
     ) -> Vec<Colour> {
         let samples = emitter_samples(self.histories).div_ceil(u64::from(self.positions()));
-        let there = receivers.iter().zip(rngs).filter_map(|(r, rng)| Some(((*r)?, rng)));
+        let there = receivers.iter().zip(rngs).filter_map(|(r, rng)| Some(((*r)?, &mut **rng)));
         let mut there: Vec<(Receiver, &mut Generator)> = there.collect();
         let effort = Effort { lamps, samples, of_sky: samples };
         let mut light = direct_light(scene, &mut there, &Shared::all(shared), effort, channels).into_iter();
         receivers.iter().map(|r| r.and_then(|_| light.next()).unwrap_or(Colour::BLACK)).collect()
     }
+}
+
+/// Receivers that stand for all that is `seen` in the positions of a bin: some of them, each chosen in proportion to what it reflects.
+fn carriers(scene: &Scene, seen: &[Seen], rng: &mut Generator) -> Receivers {
+    let matt = |r: Receiver| r.response.as_if_matt(scene, r.normal, -r.normal).luminance();
+    let worth = |seen: &Seen| seen.receiver.map_or(0.0, |r| LEAST_WORTH + matt(r));
+    let step = seen.iter().map(worth).sum::<f64>() / f64::from(CARRIERS);
+    let mut chosen = Receivers::new();
+    // Nothing, or less than a number can tell from nothing.
+    if step < f64::MIN_POSITIVE {
+        return chosen;
+    }
+    let (mut next, mut passed) = (step * rng.uniform(), 0.0);
+    let positions = seen.len() as f64;
+    for seen in seen {
+        let (before, worth) = (next, worth(seen));
+        passed += worth;
+        while next < passed {
+            next += step;
+        }
+        if next > before {
+            let weight = (next - before) / (worth * positions);
+            chosen.extend([seen.receiver, seen.behind].into_iter().flatten().map(|r| r.weighted(weight)));
+        }
+    }
+    chosen
 }

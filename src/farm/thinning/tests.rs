@@ -28,7 +28,8 @@ fn strewn(count: usize) -> Vec<Vertex> {
 
 /// What is chosen from `vertices` with start number `index`.
 fn choose(scene: &Scene, vertices: &[Vertex], index: u64) -> Vec<Vertex> {
-    let mut thinning = Thinning::new(scene, THINNING as u64, Stream::new(5, Domain::Thinning, "").generator(index));
+    let mut thinning =
+        Thinning::new(scene, (THINNING as u64, 1), Stream::new(5, Domain::Thinning, "").generator(index));
     thinning.take(vertices.iter().copied());
     thinning.choose();
     thinning.chosen
@@ -106,9 +107,10 @@ fn neighbours_stand_for_each_other() {
 fn histories_share_what_is_chosen_and_nothing_gives_nothing() {
     let (scene, vertices) = (scene(), strewn(1000));
     let connectors = |vertices: &[Vertex]| {
-        let mut thinning = Thinning::new(&scene, THINNING as u64, Stream::new(5, Domain::Thinning, "").generator(0));
+        let mut thinning =
+            Thinning::new(&scene, (THINNING as u64, 1), Stream::new(5, Domain::Thinning, "").generator(0));
         thinning.take(vertices.iter().copied());
-        thinning.finish(16)
+        thinning.finish(16).connectors
     };
     let counts = |c: Connectors| (c.histories(), c.vertices());
     assert_eq!(counts(connectors(&vertices)), (16, 125));
@@ -122,7 +124,7 @@ fn histories_share_what_is_chosen_and_nothing_gives_nothing() {
 fn many_vertices_are_chosen_from_in_turn_and_none_is_lost() {
     let scene = scene();
     let vertices = strewn(TOGETHER / 4);
-    let mut thinning = Thinning::new(&scene, THINNING as u64, Stream::new(5, Domain::Thinning, "").generator(0));
+    let mut thinning = Thinning::new(&scene, (THINNING as u64, 1), Stream::new(5, Domain::Thinning, "").generator(0));
     for _ in 0..5 {
         thinning.take(vertices.iter().copied());
     }

@@ -1,0 +1,162 @@
+//! Which of many vertices a tile of receivers is connected to.
+//!
+//! Vertices that stand for equal shares of the light are a good choice for the whole scene, but a tile in the dark is lit by few of
+//! them. So more are kept than are connected, and each tile chooses its own: vertex i, which reflects F_i, in proportion to
+//!
+//! ```text
+//! B_i = F_i (g_i + e g),    g_i = min(b, (n_i,w)_+ (N,-w)_+ / |w|^4),    g = sum F_i g_i / sum F_i
+//! ```
+//!
+//! with w from the vertex to the middle of the tile, both cosines and the distance widened by its radius, and no visibility. Chosen
+//! systematically, along the order in which the vertices lie in space, one wherever the running sum of B_i passes u D, (u + 1) D, ...
+//! with D the sum of all over the number wanted; its weight is divided by B_i/D. So every sum over vertices keeps its
+//! mean; the share e lets none that is underestimated count more than (1 + e)/e times as much as if all were alike.
+
+use super::connection::Link;
+use super::connectors::Connectors;
+use super::trajectory::Vertex;
+use crate::math::DVec3;
+use crate::random::Generator;
+use crate::scene::Scene;
+
+/// e: chosen by measured figure of merit (docs/benchmarks.md).
+const ALIKE: f32 = 0.1;
+/// Vertices that are looked at together.
+const BLOCK: usize = 16;
+
+/// Vertices to choose from, as a structure of arrays, and as connectors.
+#[derive(Debug, Default)]
+pub struct Pool {
+    connectors: Connectors,
+    blocks: Vec<Block>,
+    flux: f64,
+}
+
+#[derive(Clone, Debug, Default)]
+struct Block {
+    position: [[f32; BLOCK]; 3],
+    normal: [[f32; BLOCK]; 3],
+    flux: [f32; BLOCK],
+}
+
+impl Pool {
+    /// The pool of `vertices`, neighbours after each other; each is taken to reflect the same.
+    pub fn new(scene: &Scene, vertices: &[Vertex]) -> Self {
+        let mut connectors = Connectors::default();
+        connectors.push(scene, vertices);
+        let mut blocks = vec![Block::default(); connectors.vertices().div_ceil(BLOCK)];
+        for (i, (position, normal)) in connectors.places().enumerate() {
+            let (block, lane) = (&mut blocks[i / BLOCK], i % BLOCK);
+            for axis in 0..3 {
+                block.position[axis][lane] = position[axis];
+                block.normal[axis][lane] = normal[axis];
+            }
+            block.flux[lane] = 1.0;
+        }
+        Pool { flux: connectors.vertices() as f64, connectors, blocks }
+    }
+
+    /// About `wanted` of them for the receivers of `links`, dealt to so many `histories`; `bound` is that of the kernel.
+    pub fn choose(
+        &self,
+        links: &[Link],
+        (wanted, histories): (usize, usize),
+        bound: f64,
+        rng: &mut Generator,
+    ) -> Connectors {
+        let outlook = Outlook::new(links, bound);
+        let mut bounds: Vec<[f32; BLOCK]> = self.blocks.iter().map(|block| outlook.of(block)).collect();
+        let mut lanes = [0.0; BLOCK];
+        for bounds in &bounds {
+            lanes.iter_mut().zip(bounds).for_each(|(sum, bound)| *sum += bound);
+        }
+        let all: f64 = lanes.iter().map(|&lane| f64::from(lane)).sum();
+        // Where nothing is expected at all are equal.
+        let alike = if all > 0.0 { ALIKE * (all / self.flux) as f32 } else { 1.0 };
+        for (bounds, block) in bounds.iter_mut().zip(&self.blocks) {
+            bounds.iter_mut().zip(&block.flux).for_each(|(bound, flux)| *bound += alike * flux);
+        }
+        let sums: Vec<f64> = bounds.iter().map(sum).collect();
+        let step = sums.iter().sum::<f64>() / wanted.max(1) as f64;
+        let mut chosen = Vec::with_capacity(wanted + 1);
+        let (mut next, mut passed) = (step * rng.uniform(), 0.0);
+        for (number, (bounds, sum)) in bounds.iter().zip(sums).enumerate() {
+            let end = passed + sum;
+            let mut lane = 0;
+            while next < end {
+                let to = if lane + 1 == BLOCK { end } else { passed + f64::from(bounds[lane]) };
+                let mut times = 0.0;
+                while next < to {
+                    (next, times) = (next + step, times + 1.0);
+                }
+                if times > 0.0 {
+                    chosen.push((number * BLOCK + lane, (times * step / f64::from(bounds[lane])) as f32));
+                }
+                (passed, lane) = (to, lane + 1);
+                if lane == BLOCK {
+                    break;
+                }
+            }
+            passed = end;
+        }
+        self.connectors.dealt(&chosen, histories)
+    }
+}
+
+/// The sum of sixteen, in a fixed order.
+fn sum(of: &[f32; BLOCK]) -> f64 {
+    let mut halves = *of;
+    let mut width = BLOCK / 2;
+    while width > 0 {
+        for i in 0..width {
+            halves[i] += halves[i + width];
+        }
+        width /= 2;
+    }
+    f64::from(halves[0])
+}
+
+/// What a tile of receivers looks like from vertices.
+struct Outlook {
+    middle: [f32; 3],
+    radius: f32,
+    normal: [f32; 3],
+    /// Sine of the largest angle between `normal` and a normal of the tile.
+    spread: f32,
+    bound: f32,
+}
+
+impl Outlook {
+    fn new(links: &[Link], bound: f64) -> Self {
+        let empty = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let receivers = || links.iter().map(|link| &link.receiver);
+        let (low, high) = receivers().fold(empty, |(low, high), r| (low.min(r.position), high.max(r.position)));
+        let normal = receivers().map(|r| r.normal).sum::<DVec3>().try_normalize().unwrap_or(DVec3::Y);
+        let least = receivers().map(|r| r.normal.dot(normal)).fold(1.0, f64::min);
+        let spread = if least > 0.0 { (1.0 - least * least).max(0.0).sqrt() } else { 1.0 };
+        Outlook {
+            middle: (0.5 * (low + high)).as_vec3().to_array(),
+            radius: (0.5 * low.distance(high)) as f32,
+            normal: normal.as_vec3().to_array(),
+            spread: spread as f32,
+            bound: bound as f32,
+        }
+    }
+
+    /// F_i g_i of the vertices of a block.
+    fn of(&self, block: &Block) -> [f32; BLOCK] {
+        let mut bounds = [0.0; BLOCK];
+        for i in 0..BLOCK {
+            let way = [0, 1, 2].map(|axis| self.middle[axis] - block.position[axis][i]);
+            let normal = [0, 1, 2].map(|axis| block.normal[axis][i]);
+            let d2 = way[0] * way[0] + way[1] * way[1] + way[2] * way[2];
+            let leaving = way[0] * normal[0] + way[1] * normal[1] + way[2] * normal[2] + self.radius;
+            let height = way[0] * self.normal[0] + way[1] * self.normal[1] + way[2] * self.normal[2];
+            let arriving = self.radius + self.spread * d2.sqrt() - height;
+            let far = d2 + self.radius * self.radius + f32::MIN_POSITIVE;
+            let factor = (leaving.max(0.0) / far) * (arriving.max(0.0) / far);
+            bounds[i] = block.flux[i] * factor.min(self.bound);
+        }
+        bounds
+    }
+}
