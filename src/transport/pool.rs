@@ -12,6 +12,8 @@
 //! with D the sum of all over the number wanted; its weight is divided by B_i/D. So every sum over vertices keeps its
 //! mean; the share e lets none that is underestimated count more than (1 + e)/e times as much as if all were alike.
 
+#![allow(clippy::needless_range_loop, reason = "several arrays go by one lane")]
+
 use super::connection::Link;
 use super::connectors::Connectors;
 use super::trajectory::Vertex;

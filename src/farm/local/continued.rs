@@ -22,7 +22,7 @@ use std::ops::Range;
 
 /// Histories that share a continuation of each receiver, where it has no neighbours to share points with and where it may have:
 /// chosen by measured figure of merit (docs/benchmarks.md).
-const HISTORIES_OF_A_PATH: [usize; 2] = [4, 16];
+const HISTORIES_OF_A_PATH: [usize; 2] = [4, 32];
 /// What the points of continuations ask of direct light: chosen by measured figure of merit.
 const EFFORT: Effort = Effort { lamps: 8, samples: 4, of_sky: 1 };
 
