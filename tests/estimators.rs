@@ -79,10 +79,9 @@ fn strip(name: &str, eye: [f64; 3], target: [f64; 3]) -> String {
 
 #[test]
 fn pixels_across_an_edge_show_the_mean_of_what_is_on_both_sides() {
-    // The edge of the column before the wall, the one between two of its sides, and the floor in its shadow with its dark side.
-    let cameras = strip("silhouette", [1.5, 1.5, 1.0], [4.2, 1.4, 2.4])
-        + &strip("column", [1.5, 1.5, 1.2], [3.8, 1.4, 2.4])
-        + &strip("shadow", [5.4, 1.2, 3.5], [4.2, 0.0, 2.6]);
+    // The edge of the column before the wall, and the one between two of its sides.
+    let cameras =
+        strip("silhouette", [1.5, 1.5, 1.0], [4.2, 1.4, 2.4]) + &strip("column", [1.5, 1.5, 1.2], [3.8, 1.4, 2.4]);
     let job = omni([2.5, 2.4, 1.6], 80.0) + &cameras;
     assert_all(&local_against_reverse(&room(), &job, [(512, 256), (2048, 64)]));
 }
