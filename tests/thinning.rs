@@ -89,8 +89,8 @@ fn what_a_tile_chooses_gives_on_average_what_all_vertices_give() {
     let truth = common::connect(scene, &all, 30.0, &receivers);
     let found: Vec<Vec<f64>> = (0..CHOICES)
         .map(|i| {
-            let mut rng = Stream::new(4, Domain::Choice, "corner").generator(i);
-            let chosen = pool.choose(&links, (200, 8), 30.0, &mut rng);
+            let start = Stream::new(4, Domain::Choice, "corner").generator(i).uniform();
+            let chosen = pool.choose(&links, (200, 8), 30.0, start);
             assert_eq!(chosen.histories(), 8);
             common::connect(scene, &chosen, 30.0, &receivers).iter().map(|c| c.sum.luminance()).collect()
         })

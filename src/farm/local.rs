@@ -67,7 +67,7 @@ impl Block<'_> {
         let all = self.histories.connectors.histories();
         let nothing = |&bin: &u32| Score::nothing(self.is_watched(bin).then_some(all));
         let mut scores: Vec<Score> = self.bins.iter().map(nothing).collect();
-        self.connect_receivers(self.links(&sensed), &mut scores);
+        self.connect_receivers(&self.links(&sensed), &mut scores);
         self.add_continuations(&sensed, &mut scores);
         scores.iter_mut().for_each(|score| score.finish(1.0 / all as f64));
         (sensed, scores)
@@ -88,33 +88,36 @@ impl Block<'_> {
         (0..).zip(sensed).flat_map(|(owner, s)| s.receivers.iter().map(move |r| (owner, *r))).map(link).collect()
     }
 
-    /// Connects the histories to `links`, the receivers themselves: of a pool each tile has vertices of its own.
-    fn connect_receivers(&self, links: Vec<Link>, scores: &mut [Score]) {
+    /// Connects the histories to `links`, the receivers themselves: where there is a pool each tile has vertices of its own.
+    fn connect_receivers(&self, links: &[Link], scores: &mut [Score]) {
         let Histories { connectors, pool } = self.histories;
         let all = connectors.histories();
         let Some(pool) = pool else { return self.connect(links, 0, 0..all, 0, scores) };
-        let of_tile = |links: &[Link]| {
-            let tile = Tile::new(self.scene, links.to_vec(), 0);
-            let mut rng = self.set.choice(self.bins[links[0].owner as usize], self.batch);
-            let own = pool.choose(links, (connectors.vertices(), all), self.rule.bound, &mut rng);
-            connect(self.scene, &own, 0..all, &tile, self.rule)
+        let mut rng = self.set.choice(self.bins[0], self.batch);
+        let starts: Vec<f64> = links.chunks(TILE).map(|_| rng.uniform()).collect();
+        let of_tile = |(links, start): (&[Link], f64)| {
+            let own = pool.choose(links, (connectors.vertices(), all), self.rule.bound, start);
+            connect(self.scene, &own, 0..all, &Tile::new(self.scene, links.to_vec(), 0), self.rule)
         };
-        let connected: Vec<Vec<Connected>> = links.par_chunks(TILE).map(of_tile).collect();
-        for (link, connected) in links.iter().zip(connected.into_iter().flatten()) {
-            scores[link.owner as usize].add(&connected, 0, 0);
-        }
+        let connected: Vec<Vec<Connected>> = links.par_chunks(TILE).zip(starts).map(of_tile).collect();
+        add(links, connected, (0, 0), scores);
     }
 
     /// Connects `histories` to `links`, which lie `depth` reflections before the receivers, and adds that to the scores of the
     /// links' owners, of which the history number `first` is the first.
-    fn connect(&self, links: Vec<Link>, depth: u32, histories: Range<usize>, first: usize, scores: &mut [Score]) {
+    fn connect(&self, links: &[Link], depth: u32, histories: Range<usize>, first: usize, scores: &mut [Score]) {
         let of_tile = |links: &[Link]| {
             let tile = Tile::new(self.scene, links.to_vec(), depth);
             connect(self.scene, &self.histories.connectors, histories.clone(), &tile, self.rule)
         };
         let connected: Vec<Vec<Connected>> = links.par_chunks(TILE).map(of_tile).collect();
-        for (link, connected) in links.iter().zip(connected.into_iter().flatten()) {
-            scores[link.owner as usize].add(&connected, depth, histories.start - first);
-        }
+        add(links, connected, (depth, histories.start - first), scores);
+    }
+}
+
+/// Adds what each of `links` got, `depth` reflections before its receiver, from the history number `first` of its owner on.
+fn add(links: &[Link], connected: Vec<Vec<Connected>>, (depth, first): (u32, usize), scores: &mut [Score]) {
+    for (link, connected) in links.iter().zip(connected.into_iter().flatten()) {
+        scores[link.owner as usize].add(&connected, depth, first);
     }
 }

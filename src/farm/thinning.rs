@@ -11,6 +11,7 @@
 
 use crate::math::DVec3;
 use crate::random::Generator;
+use crate::random::systematic::Systematic;
 use crate::scene::Scene;
 use crate::transport::connection::{Connectors, dealing};
 use crate::transport::pool::Pool;
@@ -90,15 +91,11 @@ impl<'a> Thinning<'a> {
         let step = fluxes.iter().sum::<f64>() / wanted as f64;
         // Nothing, or less light than a number can tell from nothing.
         if step >= f64::MIN_POSITIVE {
-            let (mut next, mut passed) = (step * self.rng.uniform(), 0.0);
+            let mut choice = Systematic::new(step, self.rng.uniform());
             for (i, flux) in order.into_iter().zip(fluxes) {
-                passed += flux;
-                while next < passed {
-                    let vertex = self.waiting[i];
-                    let weight = vertex.weight * (step / (flux * self.thinning as f64));
-                    self.chosen.push(Vertex { weight, ..vertex });
-                    next += step;
-                }
+                let vertex = self.waiting[i];
+                let weight = vertex.weight * (step / (flux * self.thinning as f64));
+                self.chosen.extend((0..choice.times(flux)).map(|_| Vertex { weight, ..vertex }));
             }
         }
         self.waiting.clear();

@@ -7,6 +7,7 @@
 //! numbers"). Nothing about a generator is ever stored: a history is replayed from its index.
 
 pub mod sobol;
+pub mod systematic;
 
 use crate::math::{DVec2, DVec3, PI, sin_cos};
 use rand_core::Rng;
@@ -36,7 +37,8 @@ pub enum Domain {
     Emitter,
     /// Scrambling of the first directions of receiver-side continuations; the index is `batch * bins + bin`.
     Direction,
-    /// Which vertices the tiles of one receiver set are connected to; the index is `batch * bins + bin` of their first bin.
+    /// Which vertices the tiles of one receiver set are connected to; the index is `batch * bins + bin` of the first bin of
+    /// those that are scored together.
     Choice,
     /// Paths from the receivers of one receiver set; the index is `batch * bins + bin`.
     Reverse,

@@ -1,16 +1,15 @@
 //! Which of many vertices a tile of receivers is connected to.
 //!
 //! Vertices that stand for equal shares of the light are a good choice for the whole scene, but a tile in the dark is lit by few of
-//! them. So more are kept than are connected, and each tile chooses its own: vertex i, which reflects F_i, in proportion to
+//! them. So more are kept than are connected, and each tile chooses its own: vertex i in proportion to
 //!
 //! ```text
-//! B_i = F_i (g_i + e g),    g_i = min(b, (n_i,w)_+ (N,-w)_+ / |w|^4),    g = sum F_i g_i / sum F_i
+//! B_i = g_i + e g,    g_i = min(b, (n_i,w)_+ (N,-w)_+ / |w|^4),    g = the mean of the g_i
 //! ```
 //!
 //! with w from the vertex to the middle of the tile, both cosines and the distance widened by its radius, and no visibility. Chosen
-//! systematically, along the order in which the vertices lie in space, one wherever the running sum of B_i passes u D, (u + 1) D, ...
-//! with D the sum of all over the number wanted; its weight is divided by B_i/D. So every sum over vertices keeps its
-//! mean; the share e lets none that is underestimated count more than (1 + e)/e times as much as if all were alike.
+//! systematically, along the order in which the vertices lie in space, so that every sum over vertices keeps its mean; the
+//! share e lets none that is underestimated count more than (1 + e)/e times as much as if all were alike.
 
 #![allow(clippy::needless_range_loop, reason = "several arrays go by one lane")]
 
@@ -18,11 +17,13 @@ use super::connection::Link;
 use super::connectors::Connectors;
 use super::trajectory::Vertex;
 use crate::math::DVec3;
-use crate::random::Generator;
+use crate::random::systematic::Systematic;
 use crate::scene::Scene;
 
 /// e: chosen by measured figure of merit (docs/benchmarks.md).
 const ALIKE: f32 = 0.1;
+/// Bound of the kernel where it has none, so that sums stay finite \[1/m2\].
+const MOST: f64 = 1e30;
 /// Vertices that are looked at together.
 const BLOCK: usize = 16;
 
@@ -31,14 +32,14 @@ const BLOCK: usize = 16;
 pub struct Pool {
     connectors: Connectors,
     blocks: Vec<Block>,
-    flux: f64,
 }
 
 #[derive(Clone, Debug, Default)]
 struct Block {
     position: [[f32; BLOCK]; 3],
     normal: [[f32; BLOCK]; 3],
-    flux: [f32; BLOCK],
+    /// 1, or 0 in the lanes beyond the last vertex.
+    there: [f32; BLOCK],
 }
 
 impl Pool {
@@ -53,61 +54,52 @@ impl Pool {
                 block.position[axis][lane] = position[axis];
                 block.normal[axis][lane] = normal[axis];
             }
-            block.flux[lane] = 1.0;
+            block.there[lane] = 1.0;
         }
-        Pool { flux: connectors.vertices() as f64, connectors, blocks }
+        Pool { connectors, blocks }
     }
 
-    /// About `wanted` of them for the receivers of `links`, dealt to so many `histories`; `bound` is that of the kernel.
-    pub fn choose(
-        &self,
-        links: &[Link],
-        (wanted, histories): (usize, usize),
-        bound: f64,
-        rng: &mut Generator,
-    ) -> Connectors {
-        let outlook = Outlook::new(links, bound);
-        let mut bounds: Vec<[f32; BLOCK]> = self.blocks.iter().map(|block| outlook.of(block)).collect();
-        let mut lanes = [0.0; BLOCK];
-        for bounds in &bounds {
-            lanes.iter_mut().zip(bounds).for_each(|(sum, bound)| *sum += bound);
-        }
-        let all: f64 = lanes.iter().map(|&lane| f64::from(lane)).sum();
-        // Where nothing is expected at all are equal.
-        let alike = if all > 0.0 { ALIKE * (all / self.flux) as f32 } else { 1.0 };
-        for (bounds, block) in bounds.iter_mut().zip(&self.blocks) {
-            bounds.iter_mut().zip(&block.flux).for_each(|(bound, flux)| *bound += alike * flux);
-        }
-        let sums: Vec<f64> = bounds.iter().map(sum).collect();
+    /// About `wanted` of them for the receivers of `links`, dealt to so many `histories`; `bound` is that of the kernel, `start` a
+    /// uniform number.
+    pub fn choose(&self, links: &[Link], (wanted, histories): (usize, usize), bound: f64, start: f64) -> Connectors {
+        let worths = self.worths(&Outlook::new(links, bound));
+        let sums: Vec<f64> = worths.iter().map(sum).collect();
         let step = sums.iter().sum::<f64>() / wanted.max(1) as f64;
+        let mut choice = Systematic::new(step, start);
         let mut chosen = Vec::with_capacity(wanted + 1);
-        let (mut next, mut passed) = (step * rng.uniform(), 0.0);
-        for (number, (bounds, sum)) in bounds.iter().zip(sums).enumerate() {
-            let end = passed + sum;
-            let mut lane = 0;
-            while next < end {
-                let to = if lane + 1 == BLOCK { end } else { passed + f64::from(bounds[lane]) };
-                let mut times = 0.0;
-                while next < to {
-                    (next, times) = (next + step, times + 1.0);
-                }
-                if times > 0.0 {
-                    chosen.push((number * BLOCK + lane, (times * step / f64::from(bounds[lane])) as f32));
-                }
-                (passed, lane) = (to, lane + 1);
-                if lane == BLOCK {
-                    break;
+        for (number, (worths, sum)) in worths.iter().zip(sums).enumerate() {
+            if choice.skips(sum) {
+                continue;
+            }
+            for (lane, &worth) in worths.iter().enumerate() {
+                let times = choice.times(f64::from(worth));
+                if times > 0 {
+                    let factor = f64::from(times) * step / f64::from(worth);
+                    chosen.push((number * BLOCK + lane, factor as f32));
                 }
             }
-            passed = end;
         }
         self.connectors.dealt(&chosen, histories)
+    }
+
+    /// B_i of all vertices, 0 in lanes without one.
+    fn worths(&self, outlook: &Outlook) -> Vec<[f32; BLOCK]> {
+        let mut worths: Vec<[f32; BLOCK]> = self.blocks.iter().map(|block| outlook.of(block)).collect();
+        let all: f64 = worths.iter().map(sum).sum();
+        // Where nothing is expected at all are equal.
+        let alike = if all > 0.0 { ALIKE * (all / self.connectors.vertices() as f64) as f32 } else { 1.0 };
+        for (worths, block) in worths.iter_mut().zip(&self.blocks) {
+            for lane in 0..BLOCK {
+                worths[lane] += alike * block.there[lane];
+            }
+        }
+        worths
     }
 }
 
 /// The sum of sixteen, in a fixed order.
 fn sum(of: &[f32; BLOCK]) -> f64 {
-    let mut halves = *of;
+    let mut halves = of.map(f64::from);
     let mut width = BLOCK / 2;
     while width > 0 {
         for i in 0..width {
@@ -115,7 +107,7 @@ fn sum(of: &[f32; BLOCK]) -> f64 {
         }
         width /= 2;
     }
-    f64::from(halves[0])
+    halves[0]
 }
 
 /// What a tile of receivers looks like from vertices.
@@ -141,11 +133,11 @@ impl Outlook {
             radius: (0.5 * low.distance(high)) as f32,
             normal: normal.as_vec3().to_array(),
             spread: spread as f32,
-            bound: bound as f32,
+            bound: bound.min(MOST) as f32,
         }
     }
 
-    /// F_i g_i of the vertices of a block.
+    /// g_i of the vertices of a block.
     fn of(&self, block: &Block) -> [f32; BLOCK] {
         let mut bounds = [0.0; BLOCK];
         for i in 0..BLOCK {
@@ -157,7 +149,7 @@ impl Outlook {
             let arriving = self.radius + self.spread * d2.sqrt() - height;
             let far = d2 + self.radius * self.radius + f32::MIN_POSITIVE;
             let factor = (leaving.max(0.0) / far) * (arriving.max(0.0) / far);
-            bounds[i] = block.flux[i] * factor.min(self.bound);
+            bounds[i] = block.there[i] * factor.min(self.bound);
         }
         bounds
     }

@@ -119,7 +119,7 @@ impl Block<'_> {
         }
         for (points, depth) in points_by_depth(paths).into_iter().zip(1..) {
             let links = self.light_points(points, depth, (lit, group), &light);
-            self.connect(links, depth, histories.clone(), histories.start, &mut light);
+            self.connect(&links, depth, histories.clone(), histories.start, &mut light);
         }
         light
     }

@@ -166,7 +166,7 @@ impl ReceiverSet {
         Paths { rng: self.continuations.generator(index), points, next: 0 }
     }
 
-    /// The numbers by which the tile that begins with `bin` chooses its vertices in a batch.
+    /// The numbers by which the tiles of the block that begins with `bin` choose their vertices in a batch.
     pub fn choice(&self, bin: u32, batch: u64) -> Generator {
         self.choices.generator(batch * self.shape.bins() as u64 + u64::from(bin))
     }

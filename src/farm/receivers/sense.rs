@@ -9,6 +9,7 @@ use crate::math::DVec2;
 use crate::photometry::Colour;
 use crate::random::Generator;
 use crate::random::sobol::PointSet;
+use crate::random::systematic::Systematic;
 use crate::scene::Scene;
 use crate::transport::direct::emitter_samples;
 use crate::transport::eye::{Eye, Gaze};
@@ -246,16 +247,13 @@ fn carriers(scene: &Scene, seen: &[Seen], rng: &mut Generator) -> Receivers {
     if step < f64::MIN_POSITIVE {
         return chosen;
     }
-    let (mut next, mut passed) = (step * rng.uniform(), 0.0);
+    let mut choice = Systematic::new(step, rng.uniform());
     let positions = seen.len() as f64;
     for seen in seen {
-        let (before, worth) = (next, worth(seen));
-        passed += worth;
-        while next < passed {
-            next += step;
-        }
-        if next > before {
-            let weight = (next - before) / (worth * positions);
+        let worth = worth(seen);
+        let times = choice.times(worth);
+        if times > 0 {
+            let weight = f64::from(times) * step / (worth * positions);
             chosen.extend([seen.receiver, seen.behind].into_iter().flatten().map(|r| r.weighted(weight)));
         }
     }
