@@ -305,7 +305,7 @@ fn folders_without_a_plan_or_with_another_are_refused() {
 fn an_edited_or_damaged_plan_is_refused() {
     let edits = [
         ("seed = 1", "seed = 2", "edited or damaged: its digest is not that of its content"),
-        ("numerics = 5", "numerics = 9", "NUMERICS 9 of program"),
+        ("numerics = 6", "numerics = 9", "NUMERICS 9 of program"),
         ("batches = 4", "batches = 0", "run.batches = 0: 1 .."),
         ("seed = 1", "seed = ", "not a plan"),
         ("seed = 1", "seed = 1\nspeed = 1", "not a plan: unknown field `speed`"),
