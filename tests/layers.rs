@@ -230,6 +230,7 @@ fn threads_are_where_batches_are_computed_or_merged_and_in_the_loading_of_a_scen
     let allowed = [
         "farm/local",
         "farm/realization.rs",
+        "farm/receivers/edges.rs",
         "farm/thinning.rs",
         "farm/worker.rs",
         "farm/merge/passes.rs",

@@ -65,9 +65,15 @@ fn add_box(model: &mut Model, origin: DVec3, size: DVec3, reflectance: Reflectan
     }
 }
 
-/// A pixel on `target`, a lux-meter beside a wall and one behind what hangs in the middle.
-fn case(name: &str, model: Model, [eye, target]: [[f64; 3]; 2], n: u64) -> Result<Vec<Counted>> {
-    let job = tables("rqmc", 32, 32)
+/// A pixel on `target`, a lux-meter beside a wall and one behind what hangs in the middle; by few histories.
+fn case(name: &str, model: Model, views: [[f64; 3]; 2], n: u64) -> Result<Vec<Counted>> {
+    case_of(32, name, model, views, n)
+}
+
+/// The same by so many histories a batch.
+fn case_of(histories: u32, name: &str, model: Model, views: [[f64; 3]; 2], n: u64) -> Result<Vec<Counted>> {
+    let [eye, target] = views;
+    let job = tables("rqmc", 32, histories)
         + &camera("view", eye, target, 6.0, [2, 1])
         + "[[region]]\nname = \"both\"\ncamera = \"view\"\nrectangle = [0, 0, 2, 1]\n"
         + &point("near", [0.97, 0.3, 0.4], [-1.0, 0.0, 0.0])
@@ -80,7 +86,7 @@ fn case(name: &str, model: Model, [eye, target]: [[f64; 3]; 2], n: u64) -> Resul
         ("E behind or below", Kind::Total(2, 0)),
     ];
     let quantities = measured(&experiment, &wanted);
-    Ok(count(&format!("{name}, rqmc, 32 x 32"), &experiment, quantities, n))
+    Ok(count(&format!("{name}, rqmc, 32 x {histories}"), &experiment, quantities, n))
 }
 
 /// A bright panel in an opal box is all the light there is.
@@ -109,9 +115,14 @@ fn glass(n: u64) -> Result<Vec<Counted>> {
     case("wall through a block of glass", model, [[0.9, 0.4, 0.6], MIDDLE], n)
 }
 
+/// Peaked: few histories do not suffice, and say so.
 fn phong(n: u64) -> Result<Vec<Counted>> {
-    let law = Reflectance::phong(Colour::grey(0.2), Colour::grey(0.5), 40.0);
-    case("Phong floor, exponent 40", floor(law), [[0.9, 0.3, 0.5], [0.3, 0.0, 0.45]], n)
+    let law = || Reflectance::phong(Colour::grey(0.2), Colour::grey(0.5), 40.0);
+    let views = [[0.9, 0.3, 0.5], [0.3, 0.0, 0.45]];
+    let of = |histories| case_of(histories, "Phong floor, exponent 40", floor(law()), views, n);
+    let mut counted = of(32)?;
+    counted.extend(of(1024)?);
+    Ok(counted)
 }
 
 /// f = 0.05 + 0.25 sin sin' (1 - cos(phi))^2 / 4: light is thrown forward.

@@ -26,6 +26,7 @@ mod placed;
 mod projection;
 mod regions;
 mod rise;
+mod roots;
 mod samples;
 mod series;
 mod shells;
@@ -40,14 +41,18 @@ use crate::error::{Error, Result};
 use crate::math::{DVec3, PI};
 use bounds::bends;
 use regions::Steepness;
+use roots::Wave;
 use samples::Samples;
 use std::sync::Arc;
 use steps::{Taylor, safe_step};
 
 /// What the sum of a series and its comparison with |x| round, in units of its largest radius.
 const ROUNDING: f64 = 1e-14;
-/// Steps after which a line that only grazes the surface counts as meeting it.
-const MAX_STEPS: usize = 4096;
+/// Steps after which a line is asked for its exact roots: one that runs along the surface may need thousands.
+const MANY_STEPS: usize = 64;
+/// Squared distance from the centre, in units of that of the surface, below which a line meets the surface so steeply that few steps
+/// lead there.
+const STEEP: f64 = 1e-8;
 
 /// Steps of Newton's method, at most.
 const NEWTON: usize = 6;
@@ -146,9 +151,13 @@ impl Star {
         let within = |x: DVec3, at: f64| least.max(x.length() - enough(at));
         // Entering the ball around the surface is being outside; else the first look tells.
         let (mut side, mut height) = (if at > 0.0 { 1.0 } else { 0.0 }, None);
-        for _ in 0..MAX_STEPS {
+        for step in 0.. {
             if at > end {
                 return None;
+            }
+            if step >= MANY_STEPS && across2 > STEEP * low * low {
+                let found = Wave::new(&self.series, o, d, side).first(at, end)?;
+                return Some(self.crossing(o, d, found));
             }
             if side <= 0.0 && at > core.start && at < core.end {
                 (side, at) = (-1.0, core.end);
@@ -234,6 +243,14 @@ impl Star {
             }
         }
         None
+    }
+
+    /// The crossing of the line from `o` along `d` that is at the distance `at`.
+    fn crossing(&self, o: DVec3, d: DVec3, at: f64) -> Crossing {
+        let direction = (o + at * d).normalize();
+        let slope = self.series.slope(direction);
+        let (normal, _) = normal_and_area(&slope, direction);
+        Crossing { distance: at, position: slope.value * direction, normal }
     }
 
     /// Bounds of the second and third derivatives of F, or of -F where `side` is negative, where |x| is at least `least`: of how far

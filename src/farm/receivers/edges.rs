@@ -9,7 +9,11 @@ use crate::geometry::Ray;
 use crate::math::{DVec2, DVec3};
 use crate::scene::Scene;
 use crate::transport::eye::Eye;
+use rayon::prelude::*;
+use std::ops::Range;
 
+/// Rows of bins that one thread looks at.
+const BAND: u32 = 16;
 /// Cosine between normals below which surfaces are different.
 const ALIKE: f64 = 0.8;
 /// Sine of the angle with a surface above which the way to another point leaves it.
@@ -27,12 +31,19 @@ struct Corner {
 }
 
 /// For each bin of the film of `eye`, row by row, whether it lies across an edge.
-pub(super) fn across_edges(scene: &Scene, eye: &Eye, (width, height): (u32, u32)) -> Vec<bool> {
+pub(super) fn across_edges(scene: &Scene, eye: &Eye, film: (u32, u32)) -> Vec<bool> {
+    let bands: Vec<u32> = (0..film.1).step_by(BAND as usize).collect();
+    let of_band = |first: u32| across_in(scene, eye, film, first..(first + BAND).min(film.1));
+    bands.into_par_iter().flat_map_iter(of_band).collect()
+}
+
+/// The same for the bins of some rows.
+fn across_in(scene: &Scene, eye: &Eye, (width, height): (u32, u32), rows: Range<u32>) -> Vec<bool> {
     let line = |row: u32| corners(scene, eye, width, f64::from(row) / f64::from(height));
-    let mut above = line(0);
-    let mut across = Vec::with_capacity(width as usize * height as usize);
-    for row in 1..=height {
-        let below = line(row);
+    let mut above = line(rows.start);
+    let mut across = Vec::with_capacity(rows.len() * width as usize);
+    for row in rows {
+        let below = line(row + 1);
         across.extend((0..width as usize).map(|i| {
             let around = [above[i], above[i + 1], below[i + 1], below[i], above[i]];
             around.windows(2).any(|pair| are_different(pair[0], pair[1]))

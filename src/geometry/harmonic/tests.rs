@@ -1,5 +1,6 @@
 //! What is certain without the series is what the series says: samples and their errors, bounds, what is clear.
 
+use super::roots::Wave;
 use super::{Harmonic, Series, Star};
 use crate::geometry::{Geometry, Mesh, Ray};
 use crate::math::{DMat3, DVec3, sin_cos};
@@ -131,5 +132,45 @@ fn the_share_of_a_way_that_is_called_clear_meets_nothing() {
             }
         }
         assert!(whole > 0.01 * f64::from(rising), "degree {degree}: {whole} of {rising}");
+    }
+}
+
+#[test]
+fn exact_roots_are_where_steps_lead() {
+    let mut rng = generator("roots");
+    let star = Star::new(rough(24, &mut rng)).unwrap();
+    let (mut met, mut missed) = (0, 0);
+    for i in 0..20_000 {
+        // Half of them graze: beside a tangent by up to a thousandth of the radius.
+        let (n0, d) = (sphere(rng.uniform2()), sphere(rng.uniform2()));
+        let (normal, _) = star.normal_and_area(n0);
+        let d = if i % 2 == 0 { d } else { d.reject_from(normal).normalize() };
+        let beside = n0 * star.series.value(n0) + normal * 1e-3 * (2.0 * rng.uniform() - 1.0);
+        let o = beside - 3.0 * d;
+        let wave = Wave::new(&star.series, o, d, 1.0);
+        match (wave.first(0.0, 6.0), star.first_crossing(o, d, 6.0)) {
+            (Some(at), Some(crossing)) => {
+                // A crossing is known as well as F is, over its slope.
+                let slope = star.height(o + at * d, d).along.first.abs();
+                assert!((at - crossing.distance).abs() * slope < 1e-12, "{at} {}", crossing.distance);
+                met += 1;
+            }
+            (None, None) => missed += 1,
+            (root, crossing) => panic!("{root:?} by roots, {crossing:?} by steps"),
+        }
+    }
+    assert!(met > 5000 && missed > 2000, "{met} met, {missed} missed");
+}
+
+#[test]
+fn exact_roots_from_within_lead_out() {
+    let mut rng = generator("within");
+    let star = Star::new(rough(16, &mut rng)).unwrap();
+    for _ in 0..5000 {
+        let (n, d) = (sphere(rng.uniform2()), sphere(rng.uniform2()));
+        let o = n * star.series.value(n) * (0.1 + 0.89 * rng.uniform());
+        let crossing = star.first_crossing(o, d, 6.0).unwrap();
+        let root = Wave::new(&star.series, o, d, -1.0).first(0.0, 6.0).unwrap();
+        assert!((root - crossing.distance).abs() < 1e-9, "{root} {}", crossing.distance);
     }
 }
