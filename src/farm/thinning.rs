@@ -93,9 +93,12 @@ impl<'a> Thinning<'a> {
         if step >= f64::MIN_POSITIVE {
             let mut choice = Systematic::new(step, self.rng.uniform());
             for (i, flux) in order.into_iter().zip(fluxes) {
-                let vertex = self.waiting[i];
-                let weight = vertex.weight * (step / (flux * self.thinning as f64));
-                self.chosen.extend((0..choice.times(flux)).map(|_| Vertex { weight, ..vertex }));
+                let times = choice.times(flux);
+                if times > 0 {
+                    let vertex = self.waiting[i];
+                    let weight = vertex.weight * (step / (flux * self.thinning as f64));
+                    self.chosen.extend((0..times).map(|_| Vertex { weight, ..vertex }));
+                }
             }
         }
         self.waiting.clear();
