@@ -136,7 +136,7 @@ fn local_and_reverse_agree_between_open_planes() {
         + &spot_camera("plane2", [0.2, 0.4, 0.0], [0.5, 1.0, 0.0], [0.0, 0.0, 1.0]);
     let meters = point("e1", [0.5, 0.0, 0.0], [0.0, 1.0, 0.0]) + &point("air", [0.4, 0.6, 0.3], [1.0, -0.5, 0.0]);
     let job = sobolev("", 0.3, 0.9, 0.8) + &cameras + &meters;
-    assert_all(&local_against_reverse(&Model::default(), &job, [(8192, 64), (4096, 64)]));
+    assert_all(&local_against_reverse(&Model::default(), &job, [(8192, 40), (4096, 40)]));
 }
 
 /// Ulbricht's sphere, R = 1 m: E = E_0 + rho Phi / (4 pi R^2 (1 - rho)), whatever the place of the lamp.
@@ -205,7 +205,7 @@ fn local_and_reverse_agree_on_a_glossy_floor_seen_by_an_eye() {
     let job = spot_camera("steep", [0.4, 0.9, 0.4], [0.5, 0.0, 0.6], [1.0, 0.0, 0.0])
         + &spot_camera("flat", [0.2, 0.3, 0.4], [0.6, 0.0, 0.5], [0.0, 1.0, 0.0]);
     let mut all = Vec::new();
-    for (roughness, histories) in [(0.3, [(16384, 64), (1024, 64)]), (0.1, [(65536, 64), (1024, 64)])] {
+    for (roughness, histories) in [(0.3, [(16384, 44), (1024, 44)]), (0.1, [(65536, 40), (1024, 44)])] {
         let compared = local_against_reverse(&cube_with_floor(roughness, 0.0, 20.0), &job, histories);
         all.extend(compared.into_iter().map(|c| Comparison { name: format!("{roughness} {}", c.name), ..c }));
     }

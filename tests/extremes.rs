@@ -67,7 +67,7 @@ fn contact_with_an_emitting_wall() {
     add_quad(&mut model, DVec3::new(0.0, 0.0, -500.0), DVec3::Y * 1000.0, DVec3::Z * 1000.0, lambert(0.0, 100.0));
     let distances = [1e-6, 1e-3, 0.1];
     let points = distances.iter().enumerate().map(|(i, x)| point(&format!("p{i}"), [*x, 0.0, 0.0], [0.0, 1.0, 0.0]));
-    let estimates = Case::new(&(run(32768, 64) + &points.collect::<String>()), model).estimates();
+    let estimates = Case::new(&(run(8192, 64) + &points.collect::<String>()), model).estimates();
     let all = distances.iter().enumerate().map(|(i, x)| compare(format!("{x} m"), estimates[i][0], 50.0 * PI));
     for c in all {
         // The wall ends at 500 m: 0.1 % at most.

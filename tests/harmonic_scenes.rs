@@ -109,8 +109,8 @@ fn light_of_an_emissive_series_is_that_of_rays_that_find_it() {
     }
     places += &spot_camera("wall", [0.1, 0.1, 0.9], [1.0, 0.6, 0.35], [0.0, 1.0, 0.0]);
     places += &spot_camera("body", [0.1, 0.1, 0.9], [0.5, 0.5, 0.4], [0.0, 1.0, 0.0]);
-    let local = Case::new(&(run(32768, 32) + &places), room()).estimates();
-    let reversed = run(8192, 32) + "[transport]\nestimator = \"reverse\"\n" + &places;
+    let local = Case::new(&(run(16384, 48) + &places), room()).estimates();
+    let reversed = run(8192, 24) + "[transport]\nestimator = \"reverse\"\n" + &places;
     let reverse = Case::new(&reversed, room()).estimates();
     let pairs = local.iter().flatten().zip(reverse.iter().flatten());
     let all: Vec<_> = pairs.enumerate().map(|(i, (l, r))| difference(format!("bin {i}"), *l, *r)).collect();

@@ -41,7 +41,7 @@ fn emission_seen_in_mirrors_is_seen_light() {
 /// Indirect illuminance by the wall x = 2 (y from 0 to 3) at a meter that faces it.
 fn wall_case(model: &mut Model, sources: &str) -> Case {
     add_quad(model, DVec3::new(2.0, 0.0, -2.0), DVec3::Z * 4.0, DVec3::Y * 3.0, lambert(0.6, 0.0));
-    let job = "[run]\nbatches = 64\nhistories_per_batch = 65536\nseed = 51\n".to_owned()
+    let job = "[run]\nbatches = 64\nhistories_per_batch = 16384\nseed = 51\n".to_owned()
         + sources
         + &point("meter", [0.5, 1.5, 0.0], [1.0, 0.0, 0.0]);
     Case::new(&job, std::mem::take(model))
@@ -136,7 +136,7 @@ fn polished_dielectric_is_mirror_and_diffuse_at_once() {
 
 #[test]
 fn trajectories_that_never_end_are_lost_and_told() {
-    let job = "[run]\nbatches = 1\nhistories_per_batch = 2\nsampling = \"random\"\n".to_owned()
+    let job = "[run]\nbatches = 1\nhistories_per_batch = 1\nsampling = \"random\"\n".to_owned()
         + &omni([0.5, 0.4, 0.6], 100.0)
         + &point("e", [0.5, 0.0, 0.5], [0.0, 1.0, 0.0]);
     let (_, batches) = Case::new(&job, closed_box(DVec3::ONE, &lambert(1.0, 0.0))).batches(1..2);

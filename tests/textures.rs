@@ -266,7 +266,7 @@ fn local_and_reverse_agree_around_screens_and_no_light_is_lost() {
             );
             Case::new(&(run + &receivers), room.clone())
         };
-        let (local, reverse) = (case("local", 2048), case("reverse", 8192));
+        let (local, reverse) = (case("local", 512), case("reverse", 2048));
         let names = local.job.sets().into_iter().map(|s| s.name);
         let mut all: Vec<_> = names
             .zip(local.values().into_iter().zip(reverse.values()))

@@ -36,7 +36,7 @@ fn indirect(job: &str, model: Model, orders: Range<u32>) -> Vec<Estimate> {
 fn every_order_of_a_furnace_is_a_power_of_the_reflectance() {
     let furnace = || closed_box(DVec3::ONE, &lambert(0.5, 1.0 / PI));
     let order = |n: u32| -> Vec<Comparison> {
-        let found = indirect(&(run(4096, 8, 71) + &meters()), furnace(), n..n + 1);
+        let found = indirect(&(run(1024, 8, 71) + &meters()), furnace(), n..n + 1);
         let name = |i| format!("order {n}, meter {i}");
         found.iter().enumerate().map(|(i, e)| compare(name(i), *e, 1.0 / f64::from(1 << n))).collect()
     };
@@ -50,7 +50,7 @@ fn a_cavity_with_a_peaked_floor_in_colour_is_as_without() {
         let run = run(histories, thinning, seed) + "channels = \"rgb\"\n";
         indirect(&(run + &receivers), cube_with_floor(0.3, 0.9, 1.0), ALL)
     };
-    let (thinned, plain) = (of(1024, 8, 5), of(8192, 1, 6));
+    let (thinned, plain) = (of(512, 8, 5), of(4096, 1, 6));
     let all = thinned.iter().zip(&plain).enumerate();
     assert_all(&all.map(|(i, (a, b))| difference(format!("receiver {i}"), *a, *b)).collect::<Vec<_>>());
 }

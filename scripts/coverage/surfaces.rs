@@ -121,7 +121,7 @@ fn phong(n: u64) -> Result<Vec<Counted>> {
     let views = [[0.9, 0.3, 0.5], [0.3, 0.0, 0.45]];
     let of = |histories| case_of(histories, "Phong floor, exponent 40", floor(law()), views, n);
     let mut counted = of(32)?;
-    counted.extend(of(1024)?);
+    counted.extend(of(256)?);
     Ok(counted)
 }
 

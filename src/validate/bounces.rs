@@ -35,7 +35,7 @@ pub(super) fn cases() -> Vec<Case> {
 
 fn floor() -> Result<Vec<Comparison>> {
     let meters = points("r", (0..3).map(|r| ([f64::from(r), 1.5, 0.0], [0.0, -1.0, 0.0])));
-    let job = run(32768, 32) + &omni(UP, 100.0) + &plane([0.0; 3], UP, 0.5) + &meters;
+    let job = run(8192, 32) + &omni(UP, 100.0) + &plane([0.0; 3], UP, 0.5) + &meters;
     let found = Experiment::new(&job, Model::default())?.estimates_of_orders(1..u32::MAX);
     let compare = |r: usize| {
         let parameters = format!("I=100;source height 1;receiver plane at 1.5 facing down;rho=0.5;r={r}");
@@ -56,7 +56,7 @@ fn wall() -> Result<Vec<Comparison>> {
         ("P=(3.0, 2.0, 1.5) opposite wall", axes([3.0, 2.0, 1.5]), [-1.0, 0.0, 0.0]),
     ];
     let meters = points("p", places.map(|(_, position, normal)| (position, normal)));
-    let job = run(65536, 32) + &omni(axes([2.0, 1.0, 1.5]), 100.0) + &meters;
+    let job = run(8192, 32) + &omni(axes([2.0, 1.0, 1.5]), 100.0) + &meters;
     let found = Experiment::new(&job, model)?.estimates_of_orders(1..u32::MAX);
     let compare = |(i, (name, ..)): (usize, &(&str, _, _))| {
         let parameters = format!("wall x=0 4x3 rho=0.6;I=100 at (2,1,1.5);{name}");
@@ -71,7 +71,7 @@ fn square() -> Result<Vec<Comparison>> {
     let mut model = Model::default();
     add_quad(&mut model, DVec3::ZERO, DVec3::Z, DVec3::X, lambert(0.5, 0.0));
     let direction = DVec3::new(0.75f64.sqrt(), -0.5, 0.0);
-    let job = run(65536, 32) + &point("above", UP, [0.0, -1.0, 0.0]);
+    let job = run(16384, 32) + &point("above", UP, [0.0, -1.0, 0.0]);
     let (_, batches) = Experiment::new(&job, in_parallel_light(model, direction, 1000.0))?.batches(1..u32::MAX);
     let exact = 0.5 * 500.0 * parallel_corner(1.0, 1.0, 1.0);
     Ok(vec![
@@ -95,7 +95,7 @@ fn edge() -> Result<Vec<Comparison>> {
 }
 
 fn edge_plain() -> Result<Vec<Comparison>> {
-    Ok(vec![strip(1.0, 0.1, &(run(65536, 64) + PLAIN))?])
+    Ok(vec![strip(1.0, 0.1, &(run(16384, 64) + PLAIN))?])
 }
 
 #[cfg(test)]

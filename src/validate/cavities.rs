@@ -80,12 +80,12 @@ fn box_of_light(run: &str, rho: f64) -> Result<Experiment> {
 fn furnace() -> Result<Vec<Comparison>> {
     let mut all = Vec::new();
     for rho in [0.3, 0.5, 0.8] {
-        let found = box_of_light(&run(8192, 32), rho)?.values();
+        let found = box_of_light(&run(1024, 32), rho)?.values();
         let exact = cavity(1.0, 1.0, rho);
         all.push(Comparison::new(format!("L in a box, rho = {rho}"), "cd/m2", found[0], exact / PI));
         all.push(Comparison::new(format!("E in a box, rho = {rho}"), "lx", found[1], exact));
     }
-    let job = run(8192, 32) + &point("e", [0.25, 0.0, 0.25], UP);
+    let job = run(1024, 32) + &point("e", [0.25, 0.0, 0.25], UP);
     let found = Experiment::new(&job, tetrahedron(0.5))?.values();
     all.push(Comparison::new("E in a tetrahedron, rho = 0.5", "lx", found[0], cavity(1.0, 1.0, 0.5)));
     Ok(all)

@@ -42,10 +42,10 @@ pub(super) fn cases() -> Vec<Case> {
         THEME.case(name, checks, reference, move || orders(&CASES[which]))
     };
     vec![
-        total("sobolev/A", "h 0.5 and 0.5, rho 0.5 and 0.5: E and L of both planes", 0, 4096),
-        total("sobolev/B", "h 0.3 and 0.7, rho 0.9 and 0.8: E and L of both planes", 1, 4096),
-        total("sobolev/C", "h 0.7 and 0.3, rho 0.2 and 0.6: E and L of both planes", 2, 16384),
-        total("sobolev/D", "h 0.5 and 0.5, rho 0.9 and 0.8: E and L of both planes", 3, 4096),
+        total("sobolev/A", "h 0.5 and 0.5, rho 0.5 and 0.5: E and L of both planes", 0, 2048),
+        total("sobolev/B", "h 0.3 and 0.7, rho 0.9 and 0.8: E and L of both planes", 1, 2048),
+        total("sobolev/C", "h 0.7 and 0.3, rho 0.2 and 0.6: E and L of both planes", 2, 2048),
+        total("sobolev/D", "h 0.5 and 0.5, rho 0.9 and 0.8: E and L of both planes", 3, 2048),
         order("sobolev/orders-A", "each number of reflections by itself, plain estimate", 0),
         order("sobolev/orders-B", "each number of reflections by itself, plain estimate", 1),
     ]
@@ -94,7 +94,7 @@ fn totals(case: &Parameters, histories: u32) -> Result<Vec<Comparison>> {
 const RADII: [f64; 4] = [0.0, 0.5, 1.0, 2.0];
 
 fn orders(case: &Parameters) -> Result<Vec<Comparison>> {
-    let planes = sobolev(&(run(16384, 64) + PLAIN), case.h1, case.rho1, case.rho2);
+    let planes = sobolev(&(run(8192, 40) + PLAIN), case.h1, case.rho1, case.rho2);
     let job = planes + &points("e", RADII.map(|r| ([r, 0.0, 0.0], UP)));
     let experiment = Experiment::new(&job, Model::default())?;
     let table = rows(SOBOLEV_ORDERS);
