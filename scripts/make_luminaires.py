@@ -134,7 +134,7 @@ def main():
     lm63("sphere_2002", [0], whole, lambda c, g: 100, size=(-0.4, -0.4, -0.4))
     for name, size in [("rectangle", (0.3, 0.6, 0)), ("box", (0.2, 0.4, 0.1)), ("cylinder_upright", (-0.2, -0.2, 0.3)),
                        ("cylinder_along_c0", (-0.1, 0.6, -0.1)), ("cylinder_across_c0", (0.6, -0.1, -0.1)), ("sphere", (-0.3, -0.3, -0.3)),
-                       ("disc", (-0.3, -0.2, 0))]:
+                       ("disc", (-0.3, -0.2, 0)), ("disc_upright", (-0.3, 0, -0.2))]:
         lm63(f"opening_{name}", full, whole, shape, size=size)
     # Text.
     lm63("commas_between", full, whole, shape, change=lambda x: x.replace(" ", ", ").replace("[LUMINAIRE],", "[LUMINAIRE]"))

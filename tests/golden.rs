@@ -13,7 +13,7 @@ use std::process::Command;
 const GOLDEN: (u32, &str, &str) = (
     6,
     "8aa360b10609986967bf314a189ca262b39c0f033e29e2c228c20efd7dc48237",
-    "848173a3b5ce8e824b62e913e6795f851c9c2379f9ccf619c8d52973bac7b148",
+    "7345188fd7ee3aa55999c5e57e33a05d9d06b3c4e60c81ea09e91cf4883f324b",
 );
 
 #[test]

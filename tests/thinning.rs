@@ -101,3 +101,23 @@ fn what_a_tile_chooses_gives_on_average_what_all_vertices_give() {
     };
     assert_all(&(0..receivers.len()).map(compared).collect::<Vec<_>>());
 }
+
+#[test]
+fn a_pool_gives_what_it_has_whatever_is_wanted_of_it() {
+    let case = Case::new(&(run(64, 1, 1) + &meters()), cube_with_floor(0.4, 0.5, 0.8));
+    let mut vertices: Vec<Vertex> = Vec::new();
+    trace(&case.scene, &case.job.transport, &mut Stream::new(3, Domain::Trajectory, "").generator(0), &mut vertices);
+    let link = |receiver| Link { owner: 0, receiver, start: Colour::BLACK, watched: false };
+    let one = [link(meters_in_a_corner()[5])];
+    let chosen = |vertices: &[Vertex], wanted, bound| {
+        let chosen = Pool::new(&case.scene, vertices).choose(&one, (wanted, 4), bound, 0.5);
+        (chosen.histories(), chosen.vertices())
+    };
+    assert_eq!(chosen(&[], 10, 30.0), (4, 0), "none");
+    let (histories, one_or_none) = chosen(&vertices, 0, 30.0);
+    assert!(histories == 4 && one_or_none <= 1, "{one_or_none} of none wanted");
+    for bound in [30.0, f64::INFINITY] {
+        let (histories, all) = chosen(&vertices, 100 * vertices.len(), bound);
+        assert_eq!((histories, all), (4, vertices.len()), "more than there are: each counts as often as it is chosen");
+    }
+}

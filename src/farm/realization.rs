@@ -26,10 +26,6 @@ const TRAJECTORIES_AT_ONCE: u64 = 64;
 /// Trajectories traced before their vertices are thinned, all threads together.
 const WAVE: u64 = 1024;
 
-/// Vertices kept for each that a tile of receivers is connected to, at most: chosen by measured figure of merit
-/// (docs/benchmarks.md).
-const MOST_KEPT: u64 = 8;
-
 /// Everything that is the same for every batch of a job.
 pub struct Realization<'a> {
     job: &'a Job,
@@ -140,8 +136,9 @@ impl<'a> Realization<'a> {
             return (Histories { connectors, pool: None }, balance(&traced));
         }
         let mut flux = FluxBalance::default();
-        let kept = self.job.run.thinning.min(MOST_KEPT);
-        let mut thinning = Thinning::new(self.scene, (self.job.run.thinning, kept), self.thinning.generator(index));
+        let run = &self.job.run;
+        let chosen = (run.thinning, run.vertices_kept());
+        let mut thinning = Thinning::new(self.scene, chosen, self.thinning.generator(index));
         for start in (0..count).step_by(WAVE as usize) {
             let traced = self.trace::<Vertex>(index, start..(start + WAVE).min(count));
             flux.add(&balance(&traced));

@@ -50,9 +50,11 @@ use steps::{Taylor, safe_step};
 const ROUNDING: f64 = 1e-14;
 /// Steps after which a line is asked for its exact roots: one that runs along the surface may need thousands.
 const MANY_STEPS: usize = 64;
-/// Squared distance from the centre, in units of that of the surface, below which a line meets the surface so steeply that few steps
-/// lead there.
+/// Squared distance from the centre, in units of the least radius, below which a line has no angle to speak of, and meets the surface so
+/// steeply that steps lead there.
 const STEEP: f64 = 1e-8;
+/// Guard against a line of that kind whose steps are lost in rounding.
+const MOST_STEPS: usize = 1 << 16;
 
 /// Steps of Newton's method, at most.
 const NEWTON: usize = 6;
@@ -151,13 +153,13 @@ impl Star {
         let within = |x: DVec3, at: f64| least.max(x.length() - enough(at));
         // Entering the ball around the surface is being outside; else the first look tells.
         let (mut side, mut height) = (if at > 0.0 { 1.0 } else { 0.0 }, None);
-        for step in 0.. {
+        for taken in 0..MOST_STEPS {
             if at > end {
                 return None;
             }
-            if step >= MANY_STEPS && across2 > STEEP * low * low {
+            if taken >= MANY_STEPS && across2 > STEEP * low * low {
                 let found = Wave::new(&self.series, o, d, side).first(at, end)?;
-                return Some(self.crossing(o, d, found));
+                return (found <= limit).then(|| self.crossing(o, d, found));
             }
             if side <= 0.0 && at > core.start && at < core.end {
                 (side, at) = (-1.0, core.end);

@@ -137,10 +137,21 @@ impl Default for Run {
     }
 }
 
+/// Vertices kept for each that a tile of receivers is connected to, at most: chosen by measured figure of merit
+/// (docs/benchmarks.md).
+const MOST_KEPT: u64 = 8;
+/// Histories whose vertices are kept to choose from, at most, so that they do not fill the memory.
+const MOST_HISTORIES: u64 = 1 << 17;
+
 impl Run {
     /// Trajectories traced in a batch.
     pub fn trajectories_per_batch(&self) -> u64 {
         self.histories_per_batch * self.thinning
+    }
+
+    /// Vertices that are kept for each that a tile of receivers is connected to, of which it chooses its own; 1 where it has no choice.
+    pub fn vertices_kept(&self) -> u64 {
+        self.thinning.min(MOST_KEPT).min(MOST_HISTORIES / self.histories_per_batch.max(1)).max(1)
     }
 }
 

@@ -22,12 +22,12 @@ const UNIT: f64 = 1.0 / (1u64 << 53) as f64;
 pub enum Domain {
     /// Light trajectories; the index is the global index of the trajectory.
     Trajectory,
-    /// Sub-pixel positions, mirror choices, the choice of lights and area-light samples of one receiver set; the index is
+    /// Sub-pixel positions and which of them carry connections, mirror choices, the choice of lights and area-light samples of one receiver set; the index is
     /// `batch * bins + bin`.
     Receiver,
     /// Trajectories that fix the bound of the kernel before the run; the index is that of the trajectory.
     Pilot,
-    /// Receiver-side continuations of one receiver set; the index is `batch * bins + bin`.
+    /// Receiver-side continuations of one receiver set; the index is `batch * bins + bin`, and 2^60 more for each further receiver of a bin.
     Continuation,
     /// Scrambling of the quasi-random set of a batch; the index is the batch.
     Scrambling,
@@ -35,7 +35,7 @@ pub enum Domain {
     Thinning,
     /// Scrambling of the points of emitters that the receivers of one set share; the index is `batch * positions + position`.
     Emitter,
-    /// Scrambling of the first directions of receiver-side continuations; the index is `batch * bins + bin`.
+    /// Scrambling of the first directions of receiver-side continuations; the index is theirs.
     Direction,
     /// Which vertices the tiles of one receiver set are connected to; the index is `batch * bins + bin` of the first bin of
     /// those that are scored together.

@@ -97,6 +97,7 @@ fn opening(opening: &Opening) -> String {
         Shape::CylinderAlongLength => "cylinder along C0-C180",
         Shape::CylinderAlongWidth => "cylinder along C90-C270",
         Shape::UprightDisc => "upright circle or ellipse",
+        Shape::Unknown => "unknown: signs that no edition of LM-63 has",
     };
     let [length, width, height] = [opening.length, opening.width, opening.height].map(|x| short(x, 4));
     format!("{shape}: {length} m along C0-C180, {width} m along C90-C270, {height} m high")

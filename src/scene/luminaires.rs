@@ -79,7 +79,7 @@ impl Model {
             (None, job::Extent::Point) => self.lights.push(Light::Luminaire(light)),
             (None, job::Extent::Opening) => {
                 let extended = Extended::new(light, &photometry.opening, &placement).ok_or_else(|| {
-                    let allowed = "point: its file gives no luminous opening";
+                    let allowed = "point: its file gives no luminous opening with an area";
                     Error::input(job, format!("{at}.extent"), "opening", allowed)
                 })?;
                 self.add_faces(extended);

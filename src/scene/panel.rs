@@ -49,12 +49,15 @@ pub struct Panel {
 }
 
 impl Extended {
-    /// The `opening` of a luminaire with this `placement`; `None` for a point.
+    /// The `opening` of a luminaire with this `placement`; `None` where it has no area.
     pub fn new(luminaire: Luminaire, opening: &Opening, placement: &Placement) -> Option<Extended> {
+        if !opening.has_area() {
+            return None;
+        }
         let [along, across, up] = placement.edges(opening, luminaire.kind());
         let flat = matches!(opening.shape, Shape::Rectangle | Shape::Disc | Shape::UprightDisc);
         let faces = match opening.shape {
-            Shape::Point => return None,
+            Shape::Point | Shape::Unknown => return None,
             Shape::Rectangle => fan(&around(along, across, 4)),
             Shape::Disc => fan(&around(along, across, CORNERS)),
             Shape::UprightDisc => fan(&around(across, up, CORNERS)),

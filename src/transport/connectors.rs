@@ -9,7 +9,7 @@ use std::ops::Range;
 /// The golden section.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
-/// The numbers 0 .. `count` in an order of which any run is spread evenly over them.
+/// The numbers 0 .. `count` in an order of which any run, where there are more than a few, is spread evenly over them.
 pub fn dealing(count: usize) -> impl Iterator<Item = usize> {
     let gcd = |mut a: usize, mut b: usize| {
         while b > 0 {
@@ -85,8 +85,6 @@ pub struct LitPoint {
 #[derive(Debug, Default)]
 pub struct Connectors {
     all: Vec<Connector>,
-    /// True when some vertex was lit straight by a delta scatterer.
-    mirrored: bool,
     /// End of each history in `all`.
     ends: Vec<usize>,
 }
@@ -98,7 +96,6 @@ impl Connectors {
             self.all.push(connector(scene, vertex));
             self.all.extend(transmitting(scene, vertex));
         }
-        self.mirrored |= history.iter().any(|v| v.after_delta);
         self.ends.push(self.all.len());
     }
 
@@ -135,7 +132,7 @@ impl Connectors {
     /// The vertices with the numbers `chosen`, each with a factor of its weight, dealt in turn to so many histories, of which any few that
     /// follow each other hold some from everywhere.
     pub(super) fn dealt(&self, chosen: &[(usize, f32)], histories: usize) -> Connectors {
-        let mut dealt = Connectors { mirrored: self.mirrored, ..Connectors::default() };
+        let mut dealt = Connectors::default();
         for first in dealing(histories) {
             for &(number, factor) in chosen.iter().skip(first).step_by(histories) {
                 dealt.all.push(self.all[number].weighted(factor));
@@ -181,4 +178,26 @@ fn transmitting(scene: &Scene, v: &Vertex) -> Option<Connector> {
     let intensity = (v.weight * tau / PI).0.map(|c| c as f32);
     let lifted = scene.geometry.lift(v.position, -v.normal).as_vec3();
     Some(Connector { lifted, normal: -v.normal.as_vec3(), intensity, ..connector(scene, v) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::dealing;
+
+    #[test]
+    fn every_number_is_dealt_once_and_neighbours_lie_apart() {
+        for count in 0..200 {
+            let dealt: Vec<usize> = dealing(count).collect();
+            let mut sorted = dealt.clone();
+            sorted.sort_unstable();
+            assert!(sorted.into_iter().eq(0..count), "{count}: {dealt:?}");
+        }
+        // Any eight of 64 that follow each other leave no gap of twice their mean distance.
+        let dealt: Vec<usize> = dealing(64).collect();
+        for run in dealt.windows(8) {
+            let mut run = run.to_vec();
+            run.sort_unstable();
+            assert!(run.windows(2).all(|pair| pair[1] - pair[0] <= 16), "{run:?}");
+        }
+    }
 }

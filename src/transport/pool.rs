@@ -86,8 +86,9 @@ impl Pool {
     fn worths(&self, outlook: &Outlook) -> Vec<[f32; BLOCK]> {
         let mut worths: Vec<[f32; BLOCK]> = self.blocks.iter().map(|block| outlook.of(block)).collect();
         let all: f64 = worths.iter().map(sum).sum();
-        // Where nothing is expected at all are equal.
-        let alike = if all > 0.0 { ALIKE * (all / self.connectors.vertices() as f64) as f32 } else { 1.0 };
+        // Where nothing is expected, or less than a number can tell from it, all are equal.
+        let alike = ALIKE * (all / self.connectors.vertices() as f64) as f32;
+        let alike = if alike >= f32::MIN_POSITIVE { alike } else { 1.0 };
         for (worths, block) in worths.iter_mut().zip(&self.blocks) {
             for lane in 0..BLOCK {
                 worths[lane] += alike * block.there[lane];

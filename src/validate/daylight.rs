@@ -5,11 +5,13 @@
 
 use super::closed_forms::{parallel_corner, perpendicular_corner};
 use super::experiment::Experiment;
+use super::glass::{self, WINDOW, transmittance};
 use super::scenes::{UP, add_quad, add_quad_with_hole, box_walls, lambert, point, run};
 use super::{Case, Comparison, Theme};
 use crate::error::Result;
-use crate::math::{DVec3, PI, exp};
-use crate::scene::{Model, Surface};
+use crate::math::{DVec3, PI, acos, exp};
+use crate::photometry::Colour;
+use crate::scene::{Delta, Model, Pane, Reflectance, Surface};
 
 const THEME: Theme = Theme("Daylight");
 /// Luminance of the zenith \[cd/m2\].
@@ -37,6 +39,24 @@ pub(super) fn cases() -> Vec<Case> {
             "a window, free, below an overhang, and before a wall across the street",
             "view factor of a perpendicular rectangle; sums over the opening",
             facade,
+        ),
+        THEME.case(
+            "daylight/sky-types",
+            "an opening in the roof under clear and cloudy skies of the CIE standard, the sun aside",
+            "sums over the opening of the formula of the standard, written once more",
+            sky_types,
+        ),
+        THEME.case(
+            "daylight/glazed",
+            "panes in the roof and in a facade",
+            "sums over the opening of overcast sky times Fresnel's transmittance",
+            glazed,
+        ),
+        THEME.case(
+            "daylight/outside",
+            "what ground that reflects and a luminous wall across the street send through a window",
+            "sums over the opening",
+            outside,
         ),
         THEME.case(
             "daylight/white-furnace",
@@ -193,6 +213,83 @@ fn facade() -> Result<Vec<Comparison>> {
         }
     }
     Ok(all)
+}
+
+/// a, b, c, d, e of some types of the CIE standard general sky (ISO 15469), by their numbers.
+const TYPES: [(u32, [f64; 5]); 4] = [
+    (4, [1.1, -0.8, 2.0, -1.5, 0.15]),
+    (7, [0.0, -1.0, 5.0, -2.5, 0.3]),
+    (12, [-1.0, -0.32, 10.0, -3.0, 0.45]),
+    (15, [-1.0, -0.15, 24.0, -2.8, 0.15]),
+];
+
+/// Luminance of a type of the standard sky with the sun along `sun`, over that of the zenith.
+fn relative([a, b, c, d, e]: [f64; 5], sun: DVec3, w: DVec3) -> f64 {
+    let gradation = |height: f64| 1.0 + a * exp(b / height);
+    let indicatrix = |cosine: f64| 1.0 + c * (exp(d * acos(cosine)) - exp(0.5 * PI * d)) + e * cosine * cosine;
+    gradation(w.y) * indicatrix(w.dot(sun)) / (gradation(1.0) * indicatrix(sun.y))
+}
+
+fn sky_types() -> Result<Vec<Comparison>> {
+    let (model, hole) = under_roof();
+    let place = [1.8, 0.8, 2.3];
+    // 30 degrees high in the east, so that it is in no opening.
+    let sun = DVec3::new(0.75f64.sqrt(), 0.5, 0.0);
+    let mut all = Vec::new();
+    for (number, parameters) in TYPES {
+        let sky = sky(&number.to_string()) + "[sky.sun]\nazimuth_degrees = 90\nelevation_degrees = 30\n";
+        let exact = through(hole, place.into(), DVec3::Y, |w| ZENITH * relative(parameters, sun, w));
+        let found = indoors(&model, sky, hole, place)?;
+        all.push(Comparison::new(format!("type {number}, below an opening"), "lx", found, exact).within(1e-4));
+    }
+    Ok(all)
+}
+
+fn glazed() -> Result<Vec<Comparison>> {
+    let pane = Reflectance::Delta(Delta::Pane(Pane::new(WINDOW.0, Colour::grey(WINDOW.1))));
+    let mut all = Vec::new();
+    for (name, (mut model, hole), out, place) in
+        [("roof", under_roof(), DVec3::Y, [1.8, 0.8, 3.4]), ("facade", behind_facade(), DVec3::NEG_Z, [0.7, 0.8, 1.5])]
+    {
+        let [origin, u, v] = hole;
+        add_quad(&mut model, origin + 0.01 * out - 0.1 * (u + v), 1.2 * u, 1.2 * v, glass::of(pane.clone()));
+        let seen = |w: DVec3| overcast(w) * transmittance(acos(w.dot(out)));
+        let exact = through(hole, place.into(), DVec3::Y, seen);
+        let found = indoors(&model, sky("\"overcast\""), hole, place)?;
+        all.push(Comparison::new(format!("pane in the {name}"), "lx", found, exact).within(1e-4));
+    }
+    Ok(all)
+}
+
+fn outside() -> Result<Vec<Comparison>> {
+    let (model, hole) = behind_facade();
+    let place = [2.2, 1.6, 1.0];
+    let ground = 0.3;
+    // Ground in the open reflects pi times its luminance of what the sky sends.
+    let below = ground * 7.0 / 9.0 * ZENITH;
+    let reflecting = sky("\"overcast\"") + &format!("ground_reflectance = {ground}\n");
+    let of_ground = |w: DVec3| if w.y < 0.0 { below } else { overcast(w) };
+    let luminous = 400.0;
+    let mut street = model.clone();
+    add_quad(&mut street, DVec3::new(-60.0, -40.0, -6.0), DVec3::X * 120.0, DVec3::Y * 44.0, lambert(0.0, luminous));
+    let from = DVec3::from(place);
+    let of_wall = |w: DVec3| if (from + w * ((-6.0 - from.z) / w.z)).y < 4.0 { luminous } else { overcast(w) };
+    let towards = |model: &Model, sky: String| -> Result<_> {
+        let job = run(1024, 32) + &sky + &opening(hole) + &point("p", place, [0.0, 0.0, -1.0]);
+        Ok(Experiment::new(&job, model.clone())?.values()[0])
+    };
+    let exact = |seen: &dyn Fn(DVec3) -> f64| through(hole, from, DVec3::NEG_Z, seen);
+    Ok(vec![
+        Comparison::new("ground of reflectance 0.3", "lx", towards(&model, reflecting)?, exact(&of_ground))
+            .within(1e-3),
+        Comparison::new(
+            "wall across the street of 400 cd/m2",
+            "lx",
+            towards(&street, sky("\"overcast\""))?,
+            exact(&of_wall),
+        )
+        .within(MIDPOINTS),
+    ])
 }
 
 fn white() -> Result<Vec<Comparison>> {

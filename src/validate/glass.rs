@@ -10,7 +10,7 @@ use crate::scene::{Delta, Model, Pane, Reflectance, Surface};
 
 const THEME: Theme = Theme("Glass");
 /// Refractive index and what is left of light that crosses the glass once: 6 mm of float glass.
-const WINDOW: (f64, f64) = (1.52, 0.95);
+pub(super) const WINDOW: (f64, f64) = (1.52, 0.95);
 
 /// The cases, in order.
 pub(super) fn cases() -> Vec<Case> {
@@ -25,7 +25,7 @@ pub(super) fn cases() -> Vec<Case> {
     ]
 }
 
-fn of(reflectance: Reflectance) -> Surface {
+pub(super) fn of(reflectance: Reflectance) -> Surface {
     Surface { reflectance, double_sided: true, ..lambert(0.0, 0.0) }
 }
 
@@ -39,7 +39,7 @@ fn window() -> Model {
 }
 
 /// Transmittance of the pane at `angle` \[rad\], from the angles on both sides of a face.
-fn transmittance(angle: f64) -> f64 {
+pub(super) fn transmittance(angle: f64) -> f64 {
     let (index, internal) = WINDOW;
     let inside = asin(sin(angle) / index);
     let t = crate::math::pow(internal, 1.0 / cos(inside));

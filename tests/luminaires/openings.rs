@@ -1,7 +1,7 @@
 //! Luminaires with their openings: the right lux near by and far off, and the right luminance in the eye.
 
-use crate::photometry;
 use crate::scenes::{UP, assert_near, boxed, compare_both_ends, luminaire, lux, planned};
+use crate::{bytes, photometry};
 use lampyris::geometry::Ray;
 use lampyris::math::{DVec3, PI};
 use lampyris::random::{Domain, Generator, Stream, sphere};
@@ -9,8 +9,16 @@ use lampyris::scene::Scene;
 use lampyris::transport::direct::from_panels;
 use lampyris::transport::receiver::{Receiver, Response, look};
 
-pub const SHAPES: [&str; 7] =
-    ["rectangle", "disc", "box", "cylinder_upright", "cylinder_along_c0", "cylinder_across_c0", "sphere"];
+pub const SHAPES: [&str; 8] = [
+    "rectangle",
+    "disc",
+    "box",
+    "cylinder_upright",
+    "cylinder_along_c0",
+    "cylinder_across_c0",
+    "sphere",
+    "disc_upright",
+];
 
 fn random(name: &str) -> Generator {
     Stream::new(19, Domain::Trajectory, name).generator(0)
@@ -72,6 +80,7 @@ pub fn shown(shape: &str, [x, y, z]: [f64; 3]) -> f64 {
         "cylinder_along_c0" => PI * 0.0025 * x.abs() + 0.1 * 0.6 * across(y, z),
         "cylinder_across_c0" => PI * 0.0025 * y.abs() + 0.1 * 0.6 * across(x, z),
         "sphere" => PI * 0.0225,
+        "disc_upright" => PI * 0.15 * 0.1 * x.abs(),
         other => panic!("{other}"),
     }
 }
@@ -106,6 +115,29 @@ fn the_eye_sees_intensity_over_shown_area_in_twenty_directions() {
         };
         assert!(worst < tolerance, "{shape}: luminance off by {worst}");
     }
+}
+
+/// The scene of the lamp `full.ies` whose file gives an opening of this width, length and height.
+fn with_opening(size: &str, extent: &str) -> lampyris::error::Result<Scene> {
+    let text = String::from_utf8(bytes("full.ies")).unwrap();
+    let text = text.replace("1 -1 1 13 13 1 2 0 0 0", &format!("1 -1 1 13 13 1 2 {size}"));
+    let job = luminaire("sized.ies", &format!("position = [0, 0, 0]\nextent = \"{extent}\""));
+    planned(&job, &[("sized.ies", text.into_bytes())]).map(|(scene, _)| scene)
+}
+
+#[test]
+fn an_opening_without_an_area_is_refused_and_shines_as_a_point() {
+    // A point, a line, and signs that no edition has.
+    for size in ["0 0 0", "0 1.2 0", "0 -1 -2", "1 1 -1"] {
+        let refusal = with_opening(size, "opening").err().unwrap().to_string();
+        assert!(refusal.contains("no luminous opening with an area"), "{size}: {refusal}");
+        assert!(with_opening(size, "point").is_ok(), "{size}");
+    }
+    // A box without depth has two sides.
+    let scene = with_opening("0 1.2 0.3", "opening").unwrap();
+    let receiver = meter(&scene, [0.0, 0.0, 2.0], [0.0, 0.0, -1.0]);
+    let lit = from_panels(&scene, &receiver, 64, &mut random("flat")).luminance();
+    assert!(lit > 10.0, "{lit} lx");
 }
 
 #[test]

@@ -23,6 +23,8 @@ use std::ops::Range;
 /// Histories that share a continuation of each receiver, where it has no neighbours to share points with and where it may have:
 /// chosen by measured figure of merit (docs/benchmarks.md).
 const HISTORIES_OF_A_PATH: [usize; 2] = [4, 32];
+/// Paths of a receiver and batch, at least: the tails of fewer show in the means of batches.
+const LEAST_PATHS: usize = 4;
 /// What the points of continuations ask of direct light: chosen by measured figure of merit.
 const EFFORT: Effort = Effort { lamps: 8, samples: 4, of_sky: 1 };
 
@@ -48,7 +50,8 @@ impl Block<'_> {
     pub(super) fn add_continuations(&self, sensed: &[Sensed], scores: &mut [Score]) {
         let all = self.histories.connectors.histories();
         let may_share = self.may_share();
-        let groups = (all / HISTORIES_OF_A_PATH[usize::from(may_share)]).max(1);
+        let least = LEAST_PATHS.min(all / HISTORIES_OF_A_PATH[0]).max(1);
+        let groups = (all / HISTORIES_OF_A_PATH[usize::from(may_share)]).max(least);
         let of_bin = |i: usize| {
             let receivers = sensed[i].receivers.iter().enumerate();
             receivers.filter_map(move |(number, receiver)| self.continued(receiver, (i, number), groups))

@@ -3,7 +3,7 @@
 
 use super::Plan;
 use crate::error::{Error, Result};
-use crate::job::{Kept, ReceiverKind, SetShape};
+use crate::job::{Kept, ReceiverKind, Run, SetShape};
 use crate::tally::{FLUX_BINS, LARGEST};
 
 /// Most that the batch scores kept by a whole job may take \[bytes\]: merging keeps them in a file.
@@ -52,7 +52,7 @@ impl Plan {
         let tally: u64 = sets.iter().map(|s| tally_bytes(s, of_shard)).fold(0, u64::saturating_add);
         let flux = kept_bytes(FLUX_BINS.len() as u64, of_shard).saturating_add(DIGEST * of_shard);
         let scores: u64 = sets.iter().map(|s| score_bytes(s, run.histories_per_batch)).fold(0, u64::saturating_add);
-        let vertices = vertex_bytes(run.histories_per_batch, run.thinning);
+        let vertices = vertex_bytes(run);
         let checkpoint = tally.saturating_add(flux);
         let worker = [PROCESS, self.scene.bytes, checkpoint, scores, vertices].into_iter().fold(0, u64::saturating_add);
         let checkpoints = checkpoint.saturating_mul(self.shard_count());
@@ -126,10 +126,12 @@ fn tally_bytes(set: &SetShape, batches: u64) -> u64 {
 }
 
 /// Vertices of a batch that are connected, and those from which they are chosen: not all at once where they are many.
-fn vertex_bytes(histories: u64, thinning: u64) -> u64 {
-    let connected = histories.saturating_mul(VERTICES);
-    let traced = if thinning > 1 { connected.saturating_mul(thinning).min(WAITING) } else { 0 };
-    connected.saturating_add(traced).saturating_mul(VERTEX)
+fn vertex_bytes(run: &Run) -> u64 {
+    let connected = run.histories_per_batch.saturating_mul(VERTICES);
+    let traced = if run.thinning > 1 { connected.saturating_mul(run.thinning).min(WAITING) } else { 0 };
+    // As vertices, and as connectors with what a tile looks at.
+    let kept = if run.thinning > 1 { connected.saturating_mul(2 * run.vertices_kept()) } else { 0 };
+    connected.saturating_add(traced).saturating_add(kept).saturating_mul(VERTEX)
 }
 
 /// Scores, receivers and single histories of one batch.

@@ -1,7 +1,7 @@
 //! Which bins of a film lie across an edge: positions in them differ most, so they have more of them.
 //!
 //! A straight edge that crosses a bin separates its corners. So the rays through the corners of all bins are followed to the first surface
-//! (mirrors included), and a bin is across an edge where neighbouring corners show different surfaces: one and nothing, planes that
+//! (a mirror is one), and a bin is across an edge where neighbouring corners show different surfaces: one and nothing, planes that
 //! are not each other's, other reflectances or other emissions. The choice is the same for every batch, and looks at no light that arrives.
 
 use super::gaze_ray;

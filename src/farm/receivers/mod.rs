@@ -1,7 +1,7 @@
 //! Receiver sets: the bins of a camera, goniometer, grid or point as receivers, batch by batch.
 //!
 //! The bin of a map has one position in each of its strata and batch, for direct light; one of them, its stratum
-//! drawn anew each batch, carries the connections. A lux-meter stays where it is, and its direct light from lights
+//! drawn anew each batch, carries the connections. A bin across an edge has more, and some of them carry. A lux-meter stays where it is, and its direct light from lights
 //! without extent is computed once. How histories are turned into scores is in [`super::local`].
 
 mod edges;
@@ -17,7 +17,7 @@ mod reverse;
 
 use crate::error::{Error, Result, listed};
 use crate::geometry::Ray;
-use crate::job::{Camera, Grid, Job, Point, Sampling, SetShape};
+use crate::job::{Camera, Estimator, Grid, Job, Point, Sampling, SetShape};
 use crate::math::{DVec2, DVec3};
 use crate::photometry::Colour;
 use crate::random::sobol::PointSet;
@@ -74,7 +74,7 @@ pub struct Paths {
 }
 
 /// Distance between the numbers of the receivers of a bin: no job has so many bins and batches.
-const BETWEEN_RECEIVERS: u64 = 1 << 58;
+const BETWEEN_RECEIVERS: u64 = 1 << 60;
 
 /// Quasi-random coordinates of a path: two directions at matt surfaces.
 const COORDINATES: usize = 4;
@@ -142,8 +142,10 @@ impl ReceiverSet {
             Bins::Film { eye: eye @ Eye::Surface { point }, .. } => {
                 set.sights = (0..set.shape.bins()).map(|i| set.sight(eye, point.normal, i)).collect();
             }
-            Bins::Film { eye, .. } => set.edges = across_edges(scene, eye, (set.shape.width, set.shape.height)),
-            Bins::Meters(_) => {}
+            Bins::Film { eye, .. } if job.transport.estimator == Estimator::Local => {
+                set.edges = across_edges(scene, eye, (set.shape.width, set.shape.height));
+            }
+            Bins::Film { .. } | Bins::Meters(_) => {}
         }
         set
     }

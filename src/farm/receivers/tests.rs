@@ -70,3 +70,26 @@ fn a_lamp_gives_a_meter_on_it_nothing_and_the_plan_says_so() {
     assert_eq!(sets[1].fixed_direct(&scene, &[0])[0], 0.0, "the other lamp is below the plane of this meter");
     assert!(sets[2].fixed_direct(&scene, &[0])[0] > 9999.0, "a decimetre away all is as it was");
 }
+
+/// Which of the 4 x 2 pixels that look down on a floor, two of each row on either side of its edge x = 0, lie across an edge.
+fn across(model: &str, more: &str) -> Vec<bool> {
+    let (job, scene) = parsed(&format!(
+        "{model}[[camera]]\nname = \"down\"\neye = [0.01, 4.0, 0.01]\ntarget = [0.01, 0.0, 0.01]\nup = [0, 0, -1]\n\
+         vertical_fov_degrees = 20\nwidth = 4\nheight = 2\n[[source]]\nkind = \"omni\"\nposition = [0, 3, 0]\nintensity = 1\n{more}"
+    ));
+    ReceiverSet::all(&job, &scene, &[]).remove(0).edges
+}
+
+const FLOOR: &str = "[[plane]]\npoint = [0, 0, 0]\nnormal = [0, 1, 0]\nreflectance = 0.5\n";
+
+#[test]
+fn bins_lie_across_an_edge_where_their_corners_show_different_surfaces() {
+    let none = [false; 8];
+    assert_eq!(across(FLOOR, ""), none, "one plane");
+    // A wall down from the floor's level and another plane, from x = 0.3 on: the corners of the third column see both.
+    let wall = "[[plane]]\npoint = [0.3, 0, 0]\nnormal = [-1, 0.05, 0]\nreflectance = 0.5\n";
+    let third = [false, false, true, false, false, false, true, false];
+    assert_eq!(across(FLOOR, wall), third, "floor and wall");
+    let reverse = "[transport]\nestimator = \"reverse\"\n";
+    assert_eq!(across(FLOOR, &(wall.to_owned() + reverse)), [false; 0], "paths in reverse draw one position a stratum");
+}

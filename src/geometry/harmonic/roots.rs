@@ -14,9 +14,9 @@
 use super::Series;
 use crate::math::{DVec3, PI, atan2, sin_cos, tan};
 
-/// Half width of an interval below which a root in it is one that the line only touches: v is then below M h^2.
+/// Half width of an interval below which a root in it is one that the line only touches.
 const NARROWEST: f64 = 1e-11;
-/// What the sums round, in units of the largest term.
+/// What the sums round, in units of the sum of the sizes of their terms.
 const ROUNDING: f64 = 1e-13;
 /// Halvings that leave nothing of an interval.
 const HALVINGS: u32 = 60;
@@ -69,7 +69,7 @@ impl Wave {
         let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
         let [value, slope] = self.at(middle);
         let most = slope.abs() * half + 0.5 * self.second * half * half;
-        if value.abs() > most || half < NARROWEST {
+        if value.abs() > most || most < self.nil || half < NARROWEST {
             return (value < -self.nil).then_some(from);
         }
         if slope.abs() <= self.second * half {

@@ -21,6 +21,8 @@ pub enum Shape {
     CylinderAlongWidth,
     /// A circle or an ellipse that looks along the C0 direction.
     UprightDisc,
+    /// Signs that no edition of LM-63 has: nobody knows what is meant.
+    Unknown,
 }
 
 /// The luminous opening.
@@ -51,7 +53,8 @@ impl Opening {
             (-1, 1, -1) | (0, 1, -1) => Shape::CylinderAlongLength,
             (1, -1, -1) | (1, 0, -1) => Shape::CylinderAlongWidth,
             (1, 1, 0) => Shape::Rectangle,
-            _ => Shape::Box,
+            (0 | 1, 0 | 1, 0 | 1) => Shape::Box,
+            _ => Shape::Unknown,
         };
         let [mut width, mut length, height] = [width, length, height].map(f64::abs);
         if matches!(shape, Shape::Disc | Shape::UprightCylinder | Shape::Sphere) {
@@ -64,6 +67,17 @@ impl Opening {
             _ => {}
         }
         Opening { shape, width, length, height }
+    }
+
+    /// True where light can leave it: not of a point, nor of a line, nor of what is unknown.
+    pub fn has_area(&self) -> bool {
+        let Opening { width, length, height, .. } = *self;
+        match self.shape {
+            Shape::Point | Shape::Unknown => false,
+            Shape::Rectangle | Shape::Disc => width * length > 0.0,
+            Shape::UprightDisc => width * height > 0.0,
+            _ => width * length + length * height + height * width > 0.0,
+        }
     }
 
     /// The opening with the dimensions of a EULUMDAT file, whose length lies along C90-C270, and is a diameter where the width
