@@ -43,6 +43,7 @@ fn laws() -> Vec<(&'static str, Reflectance)> {
         ("phong 20", Reflectance::phong(some, more, 20.0)),
         ("phong 300", Reflectance::phong(Colour::BLACK, Colour::WHITE, 300.0)),
         ("opal", Reflectance::opal(some, more * 0.9)),
+        ("lambert", Reflectance::Lambert(more)),
         ("tabulated", tabulated()),
     ]
 }
@@ -85,10 +86,19 @@ fn directions_follow_their_density_and_factors_their_law() {
         for mu in [0.1, 0.5, 1.0] {
             let at = Incidence::new(NORMAL, mu, 1.0);
             let mut rng = generator(500 + i as u64);
-            let above = |w: &DVec3| w.dot(NORMAL) > 0.0;
-            let pdf = |w: DVec3| if above(&w) { law.pdf(NORMAL, at.w_in, w) } else { 0.0 };
-            let fit = fit(&at, pdf, || law.sample(NORMAL, at.w_in, &mut rng).map(|s| s.direction).filter(above));
-            assert!(fit.holds(), "{name}, mu {mu}: {} > {}", fit.statistic, fit.critical);
+            // What is transmitted is looked at in the mirror of the surface.
+            for side in [1.0, -1.0] {
+                let turned = |w: DVec3| if side > 0.0 { w } else { w.reflect(NORMAL) };
+                let above = |w: &DVec3| w.dot(NORMAL) > 0.0;
+                let pdf = |w: DVec3| if above(&w) { law.pdf(NORMAL, at.w_in, turned(w)) } else { 0.0 };
+                let mut draw = || law.sample(NORMAL, at.w_in, &mut rng).map(|s| turned(s.direction)).filter(above);
+                if side < 0.0 && name != "opal" {
+                    assert!((0..1000).all(|_| draw().is_none()), "{name} transmits nothing");
+                    continue;
+                }
+                let fit = fit(&at, pdf, draw);
+                assert!(fit.holds(), "{name}, mu {mu}: {} > {}", fit.statistic, fit.critical);
+            }
             for _ in 0..2000 {
                 let Some(drawn) = law.sample(NORMAL, at.w_in, &mut rng) else { continue };
                 let (w, side) = (drawn.direction, drawn.direction.dot(NORMAL));
