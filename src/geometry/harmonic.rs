@@ -21,6 +21,7 @@ pub(in crate::geometry) mod beside;
 mod between;
 mod bounds;
 pub mod file;
+mod hull;
 mod lattice;
 mod placed;
 mod projection;
@@ -89,6 +90,16 @@ struct Fall<'a> {
     around: &'a Steepness,
 }
 
+/// What a march along a line comes to, where that is not its end.
+enum Met<R> {
+    /// A place from which on what is certain was enough.
+    Settled(R),
+    /// A crossing, to rounding.
+    Reached(f64, Height),
+    /// One found as a root.
+    Root(f64),
+}
+
 /// F and its derivatives along a line, and where.
 struct Height {
     along: Taylor,
@@ -134,6 +145,25 @@ impl Star {
 
     /// The first crossing of the line from `o` along the unit vector `d`, at most `limit` away.
     pub fn first_crossing(&self, o: DVec3, d: DVec3, limit: f64) -> Option<Crossing> {
+        match self.march(o, d, limit, |fall, _| self.only_crossing(o, d, fall))? {
+            // Rounding may put it beyond the ball, whose end is no limit.
+            Met::Settled(crossing) => (crossing.distance <= limit).then_some(crossing),
+            Met::Reached(distance, height) => {
+                let (normal, _) = normal_and_area(&height.slope, height.direction);
+                Some(Crossing { distance, position: height.slope.value * height.direction, normal })
+            }
+            Met::Root(distance) => Some(self.crossing(o, d, distance)),
+        }
+    }
+
+    /// True where there is one; where it is need not be known.
+    pub(super) fn is_crossed(&self, o: DVec3, d: DVec3, limit: f64) -> bool {
+        self.march(o, d, limit, |fall, way| (fall.from + way <= limit).then_some(())).is_some()
+    }
+
+    /// Goes along a line by steps that pass no crossing, to the first, at most `limit` away. Where F certainly crosses 0 within some way, `settle` is
+    /// asked whether that is enough.
+    fn march<R>(&self, o: DVec3, d: DVec3, limit: f64, settle: impl Fn(&Fall, f64) -> Option<R>) -> Option<Met<R>> {
         let nearest = -o.dot(d);
         let across2 = (o + nearest * d).length_squared();
         let (low, high) = self.radii();
@@ -152,14 +182,14 @@ impl Star {
         let enough = |at: f64| (end - at) * (1.0 + ROUNDING) + floor;
         let within = |x: DVec3, at: f64| least.max(x.length() - enough(at));
         // Entering the ball around the surface is being outside; else the first look tells.
-        let (mut side, mut height) = (if at > 0.0 { 1.0 } else { 0.0 }, None);
+        let mut side = if at > 0.0 { 1.0 } else { 0.0 };
         for taken in 0..MOST_STEPS {
             if at > end {
                 return None;
             }
             if taken >= MANY_STEPS && across2 > STEEP * low * low {
-                let found = Wave::new(&self.series, o, d, side).first(at, end)?;
-                return (found <= limit).then(|| self.crossing(o, d, found));
+                let root = Wave::new(&self.series, o, d, side).first(at, end)?;
+                return (root <= limit).then_some(Met::Root(root));
             }
             if side <= 0.0 && at > core.start && at < core.end {
                 (side, at) = (-1.0, core.end);
@@ -175,16 +205,18 @@ impl Star {
                 let ends = step < far || enough <= far;
                 if ends { step } else { step.max(safe_step(along, self.derivatives(within(x, at), side), enough)) }
             };
+            // From inside the bounds hold outside the core only, beyond which all is known.
+            let beyond = |next: f64, side: f64| if side < 0.0 && at < core.start { next.min(core.end) } else { next };
             if guessed * guess.value > 2.0 * errors.value {
                 side = guessed;
-                let next = at + step(&guess.times(side).less(errors), side);
-                at = if side < 0.0 && at < core.start { next.min(core.end) } else { next };
+                at = beyond(at + step(&guess.times(side).less(errors), side), side);
                 continue;
             }
-            let falls = Fall { from: at, side, along: guess.times(side), errors, around };
-            if let Some(crossing) = if side == 0.0 { None } else { self.only_crossing(o, d, &falls) } {
-                // Rounding may put it beyond the ball, whose end is no limit.
-                return (crossing.distance <= limit).then_some(crossing);
+            let fall = Fall { from: at, side, along: guess.times(side), errors, around };
+            if side != 0.0
+                && let Some(settled) = self.certain_fall(x, &fall).and_then(|way| settle(&fall, way))
+            {
+                return Some(Met::Settled(settled));
             }
             let here = self.height(x, d);
             if side == 0.0 {
@@ -195,35 +227,30 @@ impl Star {
                 }
             }
             let along = here.along.times(side);
-            height = Some((at, here));
-            if along.value <= floor && (along.first <= 0.0 || along.value < -floor) {
-                break;
-            }
-            // From inside the bound holds outside the core only, beyond which all is known.
-            let next = at + step(&along, side);
-            let next = if side < 0.0 && at < core.start { next.min(core.end) } else { next };
-            if next <= at {
-                break;
+            let next = beyond(at + step(&along, side), side);
+            if along.value <= floor && (along.first <= 0.0 || along.value < -floor) || next <= at {
+                return Some(Met::Reached(at, here));
             }
             at = next;
         }
-        let (at, height) = height.filter(|(at, _)| *at <= end)?;
-        let (normal, _) = normal_and_area(&height.slope, height.direction);
-        Some(Crossing { distance: at, position: height.slope.value * height.direction, normal })
+        None
     }
 
-    /// The crossing of the line from `o` along `d` near a place where F, or -F, is not negative and falls so steeply that it certainly crosses 0 once
-    /// from there on, without having turned: by Newton's method with the second derivative of the samples.
-    fn only_crossing(&self, o: DVec3, d: DVec3, fall: &Fall) -> Option<Crossing> {
-        let Fall { from, side: sign, along, errors, around } = fall;
-        let length = (o + *from * d).length();
-        let [most, _] = around.of_lines((1.0 - self.samples.reach()) * length, -1.0);
+    /// The way within which F, or -F, crosses 0 from a place `x` on a line: where it certainly does, once, without having turned.
+    fn certain_fall(&self, x: DVec3, fall: &Fall) -> Option<f64> {
+        let Fall { along, errors, around, .. } = fall;
+        let (length, reach) = (x.length(), self.samples.reach());
+        let [most, _] = around.of_lines((1.0 - reach) * length, -1.0);
         let (value, steep) = (along.value.max(0.0) + errors.value, -along.first - errors.first);
         // At twice the way to the zero of the tangent F is below 0, and its slope still is.
         let falls = steep > 0.0 && 4.0 * most * value < steep * steep;
-        if !falls || 2.0 * value > steep * self.samples.reach() * length {
-            return None;
-        }
+        (falls && 2.0 * value <= steep * reach * length).then(|| 2.0 * value / steep)
+    }
+
+    /// The crossing of the line from `o` along `d` where F, or -F, certainly falls through 0: by Newton's method with the second derivative of
+    /// the samples.
+    fn only_crossing(&self, o: DVec3, d: DVec3, fall: &Fall) -> Option<Crossing> {
+        let Fall { from, side: sign, along, .. } = fall;
         let way = |value: f64, fall: f64| value / fall * (1.0 + 0.5 * along.second * value / (fall * fall));
         let mut at = from + way(along.value, -along.first);
         for _ in 0..NEWTON {

@@ -1,7 +1,7 @@
 //! Where points are beside a star-shaped object: one by one, and in tiles.
 
 use super::Harmonic;
-use super::rise::{Depart, Leave, Rise, Rises};
+use super::rise::{Depart, Leave, Rise, Rises, Shares};
 use crate::geometry::points::Ends;
 use crate::geometry::simd::Path;
 use crate::geometry::visibility::{BUNDLE, BUNDLES, Lanes};
@@ -21,9 +21,9 @@ pub(in crate::geometry) struct Beside {
 }
 
 impl Beside {
-    /// The share of the way `d` from there that is certainly clear.
-    pub(super) fn clear(&self, d: Vec3) -> f32 {
-        self.rise.map_or(0.0, |rise| rise.clear(d))
+    /// The share of the way `d` from there that is certainly clear; `None` where all of it is, and all beyond.
+    pub(super) fn clear(&self, d: Vec3) -> Option<f32> {
+        self.rise.map_or(Some(0.0), |rise| rise.clear(d))
     }
 }
 
@@ -53,25 +53,16 @@ impl TileBeside {
         tile
     }
 
-    /// The points `asked`, each as far towards `apex` as its way there is certainly clear; `None` where none of them moves.
-    pub(super) fn towards(&self, path: Path, apex: Vec3, points: &Ends, asked: &Lanes) -> Option<Ends> {
-        let rises = self.rises.as_ref()?;
-        if asked.iter().zip(&self.near).all(|(asked, near)| asked & near == 0) {
-            return None;
-        }
-        let mut ends = points.clone();
-        path.run(Leave { rises, apex, asked, ends: &mut ends });
-        Some(ends)
+    /// The points `asked`, each as far towards `apex` as its way there is certainly clear, `None` where none of them moves; and those where all of it
+    /// is.
+    pub(super) fn towards(&self, path: Path, apex: Vec3, ends: &Ends, asked: &Lanes) -> (Option<Ends>, Lanes) {
+        let rises = self.rises.as_ref();
+        rises.map_or((None, [0; BUNDLES]), |rises| path.run(Leave { rises, apex, asked, ends }))
     }
 }
 
-/// The shares of the ways from `from`, which is `here`, to the points `asked` that are certainly clear.
-pub(super) fn shares(
-    path: Path,
-    here: &Beside,
-    from: Vec3,
-    points: &Ends,
-    asked: &Lanes,
-) -> Option<[[f32; BUNDLE]; BUNDLES]> {
-    here.rise.as_ref().map(|rise| path.run(Depart { rise, from, asked, ends: points }))
+/// The shares of the ways from `from`, which is `here`, to the points `asked` that are certainly clear, and the points where all of it is.
+pub(super) fn shares(path: Path, here: &Beside, from: Vec3, ends: &Ends, asked: &Lanes) -> (Shares, Lanes) {
+    let none = ([[0.0; BUNDLE]; BUNDLES], [0; BUNDLES]);
+    here.rise.as_ref().map_or(none, |rise| path.run(Depart { rise, from, asked, ends }))
 }

@@ -6,11 +6,12 @@
 //! the room that the meshes leave.
 
 use super::Crossing;
-use super::beside::{TileBeside, shares};
-use super::placed::{Harmonic, Pair};
+use super::beside::{Beside, TileBeside, shares};
+use super::placed::{Harmonic, Pair, Shelled};
+use super::rise::Shares;
 use crate::geometry::mesh::bits;
 use crate::geometry::points::Ends;
-use crate::geometry::visibility::{BUNDLE, BUNDLES, Lanes, Points, Scratch, Starts};
+use crate::geometry::visibility::{BUNDLES, Lanes, Points, Scratch, Starts};
 use crate::geometry::{Hit, Ray, hit};
 use crate::math::{DVec3, Vec3};
 use std::ops::Range;
@@ -25,6 +26,16 @@ struct Segment {
     part: [Vec3; 2],
     /// Whether the ends may be within the outer mesh.
     near: [bool; 2],
+}
+
+/// The segments from an apex to the points of a tile.
+struct Tile<'a> {
+    apex: Vec3,
+    points: &'a Points,
+    /// The points, each moved along its segment as far as that is certainly clear.
+    ends: &'a Ends,
+    /// The points that may be within the outer mesh.
+    near: &'a Lanes,
 }
 
 /// A crossing in the coordinates of an object, looked for from `before` on \[m\], with lengths `scale` times those of the world.
@@ -55,41 +66,46 @@ impl Harmonic {
             let whole = |bundle, lane| [apex, points.point(bundle, lane)];
             return clear_bits(seen, *seen, |bundle, lane| self.crosses(&Segment::inside(whole(bundle, lane))));
         };
-        let (path, fine) = (shells.fine.outer.path, &shells.fine);
-        let moved = beside.towards(path, apex, &points.ends, seen);
+        let (moved, mut free) = beside.towards(shells.fine.outer.path, apex, &points.ends, seen);
         let ends = moved.as_ref().unwrap_or(&points.ends);
-        if here.far && moved.is_none() {
-            let (free, open) = shells.coarse.decide((apex, None), ends, seen, scratch);
-            *seen = open;
-            if open != [0; BUNDLES] {
-                let (free_too, open) = fine.decide((apex, None), ends, seen, scratch);
-                *seen = joined(&free_too, &open, |free, open| free | open);
-                let whole = |bundle, lane| [apex, points.point(bundle, lane)];
-                let segment = |whole| Segment { whole, part: whole, near: [false; 2] };
-                clear_bits(seen, open, |bundle, lane| self.crosses(&segment(whole(bundle, lane))));
-            }
+        *seen = joined(seen, &free, |seen, free| seen & !free);
+        let tile = Tile { apex, points, ends, near: &beside.near };
+        if here.near {
+            self.hide_beside(&here, &tile, shells, seen, scratch);
             *seen = joined(seen, &free, |seen, free| seen | free);
             return;
         }
-        let shares = shares(path, &here, apex, ends, seen);
-        let segment = |bundle: usize, lane: usize| {
-            let to = ends.point(bundle, lane);
-            let from = apex + shares.as_ref().map_or(0.0, |shares| shares[bundle][lane]) * (to - apex);
-            let whole = [apex, points.point(bundle, lane)];
-            Segment { whole, part: [from, to], near: [here.near, beside.near[bundle] >> lane & 1 == 1] }
-        };
-        let slow = shares.as_ref().map_or([0; BUNDLES], |shares| below_half(shares, seen));
-        let fast = joined(seen, &slow, |seen, slow| seen & !slow);
-        let starts = shares.map(|shares| Starts::new(shares, &fast));
-        let (mut free, open) = fine.decide((apex, starts.as_ref()), ends, &fast, scratch);
-        if here.near {
-            let asked = joined(&free, &beside.near, |free, near| free & near);
-            clear_bits(&mut free, asked, |bundle, lane| {
-                let segment = segment(bundle, lane);
-                self.is_within(&segment) && self.crosses(&segment)
-            });
+        // Points on the surface are within the coarse outer mesh even where they are moved.
+        let coarse = (here.far && moved.is_none()).then_some(&shells.coarse);
+        let mut open = *seen;
+        for pair in [coarse, Some(&shells.fine)].into_iter().flatten() {
+            if open == [0; BUNDLES] {
+                break;
+            }
+            let (certain, left) = pair.decide((apex, None), ends, &open, scratch);
+            free = joined(&free, &certain, |free, certain| free | certain);
+            open = left;
         }
-        *seen = joined(&free, &slow, |free, slow| free | slow);
+        *seen = joined(&free, &open, |free, open| free | open);
+        clear_bits(seen, open, |bundle, lane| self.crosses(&tile.segment(bundle, lane, 0.0, false)));
+    }
+
+    /// The same for an `apex` that may be within the outer meshes, where it is `here`.
+    fn hide_beside(&self, here: &Beside, tile: &Tile, shells: &Shelled, seen: &mut Lanes, scratch: &mut Scratch) {
+        let (fine, apex) = (&shells.fine, tile.apex);
+        let (shares, above) = shares(fine.outer.path, here, apex, tile.ends, seen);
+        let segment = |bundle: usize, lane: usize| tile.segment(bundle, lane, shares[bundle][lane], true);
+        let asked = joined(seen, &above, |seen, above| seen & !above);
+        let slow = below_half(&shares, &asked);
+        let fast = joined(&asked, &slow, |asked, slow| asked & !slow);
+        let (mut free, open) = fine.decide((apex, Some(&Starts::new(shares, &fast))), tile.ends, &fast, scratch);
+        let within = joined(&free, tile.near, |free, near| free & near);
+        clear_bits(&mut free, within, |bundle, lane| {
+            let segment = segment(bundle, lane);
+            self.is_within(&segment) && self.crosses(&segment)
+        });
+        *seen = joined(&free, &above, |free, above| free | above);
+        *seen = joined(seen, &slow, |seen, slow| seen | slow);
         clear_bits(seen, slow, |bundle, lane| self.is_crossed(fine, &segment(bundle, lane)));
         *seen = joined(seen, &open, |seen, open| seen | open);
         clear_bits(seen, open, |bundle, lane| self.crosses(&segment(bundle, lane)));
@@ -103,8 +119,10 @@ impl Harmonic {
         }
         match &self.shells {
             Some(shells) if !sides[0].inside => {
-                let to = b + sides[1].clear(a - b) * (a - b);
-                let from = a + sides[0].clear(to - a) * (to - a);
+                let Some(share) = sides[1].clear(a - b) else { return false };
+                let to = b + share * (a - b);
+                let Some(share) = sides[0].clear(to - a) else { return false };
+                let from = a + share * (to - a);
                 let segment = Segment { whole: [a, b], part: [from, to], near: sides.map(|side| side.near) };
                 self.is_crossed(&shells.fine, &segment)
             }
@@ -137,7 +155,11 @@ impl Harmonic {
         let ray = Ray { origin: a, direction: (b - a) / whole };
         let [from, to] = segment.part.map(|p| (p.as_dvec3() - a).dot(ray.direction));
         let off = ROUNDING * a.abs().max(b.abs()).max_element();
-        self.first_within(&ray, (from - off).max(0.0)..(to + off).min(whole), segment.near).is_some()
+        let part = self.part_within(&ray, (from - off).max(0.0)..(to + off).min(whole), segment.near);
+        part.is_some_and(|part| {
+            let (origin, way, scale) = self.own(&ray, part.start);
+            self.star.is_crossed(origin, way, (part.end - part.start) * scale)
+        })
     }
 
     /// The first point of the surface along `ray`, at most `limit` away \[m\].
@@ -147,7 +169,7 @@ impl Harmonic {
         }
         let here = self.beside(ray.origin);
         let around = limit.min(2.0 * self.around().1);
-        let clear = f64::from(here.clear((around * ray.direction).as_vec3())) * around;
+        let clear = f64::from(here.clear((around * ray.direction).as_vec3())?) * around;
         let line = self.first_within(ray, clear..limit, [here.near, limit < f64::INFINITY])?;
         Some(self.met(ray, &line))
     }
@@ -200,33 +222,40 @@ impl Harmonic {
 
     /// How far along `ray` its surface is first met, by the series alone \[m\]: the twin that tests the meshes.
     pub fn first_crossing(&self, ray: &Ray) -> Option<f64> {
-        let own = self.to_own * ray.direction;
-        let scale = own.length();
-        let origin = self.to_own * (ray.origin - self.center);
-        self.star.first_crossing(origin, own / scale, f64::INFINITY).map(|crossing| crossing.distance / scale)
+        let (origin, way, scale) = self.own(ray, 0.0);
+        self.star.first_crossing(origin, way, f64::INFINITY).map(|crossing| crossing.distance / scale)
     }
 
-    /// The first crossing of a part of `ray`, whose ends may be within the outer mesh or are certainly not: from where it enters that, by the series.
-    fn first_within(&self, ray: &Ray, part: Range<f64>, [starts_near, ends_near]: [bool; 2]) -> Option<Line> {
-        let Some(shells) = &self.shells else { return self.look(ray, part) };
+    /// The first crossing of a part of `ray`, whose ends may be within the outer mesh or are certainly not.
+    fn first_within(&self, ray: &Ray, part: Range<f64>, near: [bool; 2]) -> Option<Line> {
+        self.look(ray, self.part_within(ray, part, near)?)
+    }
+
+    /// What the series must be asked of a part of `ray`: from where it enters the outer mesh on.
+    fn part_within(&self, ray: &Ray, part: Range<f64>, [starts_near, ends_near]: [bool; 2]) -> Option<Range<f64>> {
+        let Some(shells) = &self.shells else { return Some(part) };
         let Range { start, end } = part;
         let here = Ray { origin: ray.origin + start * ray.direction, direction: ray.direction };
         match shells.fine.outer.closest_hit(&here, end - start) {
-            Some(outer) if outer.front => self.look(ray, start + outer.distance..end),
-            Some(_) => self.look(ray, start..end),
+            Some(outer) if outer.front => Some(start + outer.distance..end),
+            Some(_) => Some(start..end),
             // No way in from outside, and none out to an end that is there.
-            None if starts_near && ends_near => self.look(ray, start..end),
-            None => None,
+            None => (starts_near && ends_near).then_some(start..end),
         }
     }
 
-    /// The same by the series alone.
+    /// The first crossing by the series alone.
     fn look(&self, ray: &Ray, part: Range<f64>) -> Option<Line> {
+        let (origin, way, scale) = self.own(ray, part.start);
+        let crossing = self.star.first_crossing(origin, way, (part.end - part.start) * scale)?;
+        Some(Line { crossing, before: part.start, scale })
+    }
+
+    /// The point `from` along `ray` and the direction of that, in coordinates of the object, where lengths are so many times those of the world.
+    fn own(&self, ray: &Ray, from: f64) -> (DVec3, DVec3, f64) {
         let way = self.to_own * ray.direction;
         let scale = way.length();
-        let origin = self.to_own * (ray.origin + part.start * ray.direction - self.center);
-        let crossing = self.star.first_crossing(origin, way / scale, (part.end - part.start) * scale)?;
-        Some(Line { crossing, before: part.start, scale })
+        (self.to_own * (ray.origin + from * ray.direction - self.center), way / scale, scale)
     }
 }
 
@@ -250,6 +279,16 @@ impl Pair {
     }
 }
 
+impl Tile<'_> {
+    /// That to one point, clear from the apex on for this `share` of the way to where the point was moved; `near` tells of the apex.
+    fn segment(&self, bundle: usize, lane: usize, share: f32, near: bool) -> Segment {
+        let (apex, to) = (self.apex, self.ends.point(bundle, lane));
+        let whole = [apex, self.points.point(bundle, lane)];
+        let part = [apex + share * (to - apex), to];
+        Segment { whole, part, near: [near, self.near[bundle] >> lane & 1 == 1] }
+    }
+}
+
 impl Segment {
     /// Between two points on the same side, for an object without meshes or from within.
     fn inside(whole: [Vec3; 2]) -> Segment {
@@ -258,7 +297,7 @@ impl Segment {
 }
 
 /// The points in `seen` whose shares are below half of the greatest: what is asked of all of a tile would begin too early for the others.
-fn below_half(shares: &[[f32; BUNDLE]; BUNDLES], seen: &Lanes) -> Lanes {
+fn below_half(shares: &Shares, seen: &Lanes) -> Lanes {
     let (mut most, mut below) = (0f32, [0; BUNDLES]);
     for bundle in 0..BUNDLES {
         for lane in bits(u32::from(seen[bundle])) {

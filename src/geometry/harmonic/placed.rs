@@ -1,6 +1,7 @@
 //! Star-shaped objects where they stand in the world, and the meshes that decide for most rays and segments.
 
 use super::beside::Beside;
+use super::hull::Hull;
 use super::rise::Rise;
 use super::shells::Shells;
 use super::{Star, normal_and_area};
@@ -34,6 +35,8 @@ const COARSE: usize = 8;
 pub(super) struct Shelled {
     pub(super) coarse: Pair,
     pub(super) fine: Pair,
+    /// What all of the surface lies within.
+    pub(super) hull: Hull,
 }
 
 /// Two meshes: what crosses the inner one crosses the surface; what does not cross the outer one does not, where one end is outside of that too.
@@ -72,7 +75,8 @@ impl Harmonic {
     /// Memory of its samples and meshes \[bytes\]; what the series takes is in proportion to its file.
     pub(in crate::geometry) fn bytes(&self) -> u64 {
         let of = |pair: &Pair| pair.inner.bytes() + pair.outer.bytes();
-        self.star.samples.bytes() + self.shells.as_ref().map_or(0, |shells| of(&shells.coarse) + of(&shells.fine))
+        self.star.samples.bytes()
+            + self.shells.as_ref().map_or(0, |shells| of(&shells.coarse) + of(&shells.fine) + shells.hull.bytes())
     }
 
     /// The object in its own coordinates.
@@ -137,8 +141,11 @@ impl Harmonic {
         let [near, far] = [length <= (look.value + error) * fine, length > (look.value + error) * coarse];
         let certain = (length - look.value).abs() > error;
         let inside = if certain { length < look.value } else { length < self.star.series.value(n) };
-        let rise = || Rise::new(own, &look, self.star.samples.reach(), &self.to_own, self.shrunk);
-        Beside { inside, near, far, rise: (near && !inside).then(rise) }
+        let frames = (&self.to_own, &self.to_world);
+        let rise = |shells: &Arc<Shelled>| {
+            Rise::new(own, &look, (self.star.samples.reach(), &shells.hull), frames, self.shrunk)
+        };
+        Beside { inside, near, far, rise: self.shells.as_ref().filter(|_| near && !inside).map(rise) }
     }
 
     /// The same object with meshes inside and outside of it, for rays that come from anywhere in the box `around` \[m\].
@@ -156,12 +163,13 @@ impl Harmonic {
             let triangles: Vec<_> = triangles.iter().map(|&t| turned(t).map(place)).collect();
             Mesh::within(&triangles, Build::Thorough, around)
         };
-        let pair = |cells: usize| {
-            let shells = Shells::new(&self.star, cells, margin);
+        let pair = |shells: &Shells| {
             let (inner, outer) = rayon::join(|| mesh(&shells.inner), || mesh(&shells.outer));
             Pair { inner, outer, reach: shells.reach }
         };
-        self.shells = Some(Arc::new(Shelled { coarse: pair(COARSE), fine: pair(FINE) }));
+        let [coarse, fine] = [COARSE, FINE].map(|cells| Shells::new(&self.star, cells, margin));
+        let shelled = Shelled { coarse: pair(&coarse), fine: pair(&fine), hull: Hull::new(&fine.outer) };
+        self.shells = Some(Arc::new(shelled));
         self
     }
 

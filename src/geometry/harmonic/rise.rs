@@ -1,13 +1,15 @@
-//! How far from a point just outside of a surface a segment is certainly clear.
+//! How far from a point just outside of a surface a segment is certainly clear, and whether it is from there on.
 //!
 //! ```text
 //! F(p + s D) >= s h(s),   h(s) = (g,D) + s D'QD/2 - s^2 M |D|^3/6        0 <= s, F(p) >= 0, |s D| <= reach
 //! ```
 //!
 //! with g and Q the first and second derivatives of F in space at p and M a bound of the third along lines around. h is concave, so up to its
-//! root there is no surface. With D the whole way to another point, s is the share of it that is clear. Numbers are f32 and in the
-//! world; their roundings are in what is taken off the slope and the bend.
+//! root there is no surface. With D the whole way to another point, s is the share of it that is clear. Where s (g,D) exceeds the height of the
+//! plane across g that the whole surface lies under (`hull`) above p, what follows is above that plane too, and so clear however far it goes. Numbers
+//! are f32 and in the world; their roundings are in what is taken off the slope and the bend.
 
+use super::hull::Hull;
 use super::samples::Look;
 use crate::geometry::points::Ends;
 use crate::geometry::simd::{Isa, Kernel, Vector};
@@ -15,23 +17,33 @@ use crate::geometry::visibility::{BUNDLE, BUNDLES, Lanes};
 use crate::math::{DMat3, DVec3, Vec3};
 
 /// Numbers of a rise.
-const NUMBERS: usize = 13;
+const NUMBERS: usize = 14;
 /// What f32 rounds of a sum of products, in units of the largest.
 const ROUNDING: f64 = 2e-6;
 /// What is left off a share for the rounding of its own.
 const MARGIN: f32 = 1.0 - 1e-5;
 
+/// Shares of the ways to the points of a tile.
+pub(super) type Shares = [[f32; BUNDLE]; BUNDLES];
+
 /// The derivatives of F at a point, where the distance to the surface is not negative.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::geometry) struct Rise {
-    /// g, what it is wrong by, Q (xx, yy, zz, yz, xz, xy), what it is wrong by, M/6, reach \[m\].
+    /// g, what it is wrong by, Q (xx, yy, zz, yz, xz, xy), what it is wrong by, M/6, reach \[m\], and (g,x) of the plane above all
+    /// less that of p.
     numbers: [f32; NUMBERS],
 }
 
 impl Rise {
-    /// At `p` in the coordinates of a surface, which looks as `look` says in the direction of `p`, as far as an angle with this `sine`; `to_own`
-    /// leads there from the world, and makes nothing longer than by the factor `stretch`.
-    pub(super) fn new(p: DVec3, look: &Look, sine: f64, to_own: &DMat3, stretch: f64) -> Rise {
+    /// At `p` in the coordinates of a surface, which looks as `look` says in the direction of `p`, as far as an angle with this `sine`, and stays
+    /// within the `hull`; `to_own` leads there from the world, and makes nothing longer than by the factor `stretch`, `to_world` leads back.
+    pub(super) fn new(
+        p: DVec3,
+        look: &Look,
+        (sine, hull): (f64, &Hull),
+        (to_own, to_world): (&DMat3, &DMat3),
+        stretch: f64,
+    ) -> Rise {
         let length = p.length();
         let n = p / length;
         let outer = |a: DVec3, b: DVec3| DMat3::from_cols(a * b.x, a * b.y, a * b.z);
@@ -50,15 +62,19 @@ impl Rise {
         let [yz, xz, xy] = [rows[1][2], rows[0][2], rows[0][1]].map(single);
         let [wrong, bent_wrong, third] = [wrong, bent_wrong, third / 6.0 * stretch * stretch * stretch].map(single);
         let reach = single(sine * length / stretch);
-        Rise { numbers: [gx, gy, gz, wrong, xx, yy, zz, yz, xz, xy, bent_wrong, third, reach] }
+        // Of g as it was rounded.
+        let across = to_world.transpose() * DVec3::new(gx.into(), gy.into(), gz.into());
+        let above = hull.support(across) - across.dot(p);
+        let above = single(above.max(0.0) + ROUNDING * (above.abs() + across.length() * length));
+        Rise { numbers: [gx, gy, gz, wrong, xx, yy, zz, yz, xz, xy, bent_wrong, third, reach, above] }
     }
 
-    /// The share of the way `d` \[m\] that is clear.
-    pub(super) fn clear(&self, d: Vec3) -> f32 {
-        let [gx, gy, gz, wrong, xx, yy, zz, yz, xz, xy, bent_wrong, third, reach] = self.numbers;
+    /// The share of the way `d` \[m\] that is clear; `None` where all of it is, and all beyond.
+    pub(super) fn clear(&self, d: Vec3) -> Option<f32> {
+        let [gx, gy, gz, wrong, xx, yy, zz, yz, xz, xy, bent_wrong, third, reach, above] = self.numbers;
         let slope = gx * d.x + gy * d.y + gz * d.z - wrong * (d.x.abs() + d.y.abs() + d.z.abs());
         if slope <= 0.0 {
-            return 0.0;
+            return Some(0.0);
         }
         let length2 = d.x * d.x + d.y * d.y + d.z * d.z;
         let sides = yz * d.y * d.z + xz * d.x * d.z + xy * d.x * d.y;
@@ -67,17 +83,18 @@ impl Rise {
         let third = third * length2 * length;
         let size = bend.abs() + (bend * bend + 4.0 * third * slope).sqrt();
         let share = if bend < 0.0 { 2.0 * slope / size } else { 0.5 * size / third };
-        share.min(reach / length).min(1.0) * MARGIN
+        let share = share.min(reach / length).min(1.0) * MARGIN;
+        (share * slope <= above).then_some(share)
     }
 }
 
-/// The rises of the points of a tile; where there is none all is 0.
+/// The rises of the points of a tile, all 0 where there is none, and where there are.
 #[derive(Debug)]
-pub(super) struct Rises([[[f32; BUNDLE]; BUNDLES]; NUMBERS]);
+pub(super) struct Rises([[[f32; BUNDLE]; BUNDLES]; NUMBERS], Lanes);
 
 impl Default for Rises {
     fn default() -> Self {
-        Rises([[[0.0; BUNDLE]; BUNDLES]; NUMBERS])
+        Rises([[[0.0; BUNDLE]; BUNDLES]; NUMBERS], [0; BUNDLES])
     }
 }
 
@@ -86,22 +103,25 @@ impl Rises {
         for (column, number) in self.0.iter_mut().zip(rise.numbers) {
             column[point / BUNDLE][point % BUNDLE] = number;
         }
+        self.1[point / BUNDLE] |= 1 << (point % BUNDLE);
     }
 }
 
-/// Puts the points `asked` of a tile as far towards `apex` as their ways there are clear.
+/// Puts the points `asked` of a tile as far towards `apex` as their ways there are clear, but leaves those where all of it is; `None` where no other
+/// is left.
 pub(super) struct Leave<'a> {
     pub(super) rises: &'a Rises,
     pub(super) apex: Vec3,
     pub(super) asked: &'a Lanes,
-    pub(super) ends: &'a mut Ends,
+    pub(super) ends: &'a Ends,
 }
 
 impl Kernel for Leave<'_> {
-    type Output = ();
+    type Output = (Option<Ends>, Lanes);
 
     #[inline(always)]
-    fn run<I: Isa>(self) {
+    fn run<I: Isa>(self) -> (Option<Ends>, Lanes) {
+        let (mut moved, mut free) = (None, [0; BUNDLES]);
         let apex = splat::<I>(self.apex);
         for bundle in 0..BUNDLES {
             if self.asked[bundle] == 0 {
@@ -113,15 +133,27 @@ impl Kernel for Leave<'_> {
             for k in 0..NUMBERS {
                 numbers[k] = I::Sixteen::load(&self.rises.0[k][bundle]);
             }
-            let share = share::<I>(&numbers, &d);
-            let moved = [d[0].mul(share).add(at[0]), d[1].mul(share).add(at[1]), d[2].mul(share).add(at[2])];
-            self.ends.set_bundle::<I>(bundle, &moved, self.asked[bundle]);
+            let (share, clear) = share::<I>(&numbers, &d);
+            free[bundle] = self.asked[bundle] & clear as u16;
+            let left = self.asked[bundle] & !free[bundle];
+            if left & self.rises.1[bundle] != 0 {
+                let to = [d[0].mul(share).add(at[0]), d[1].mul(share).add(at[1]), d[2].mul(share).add(at[2])];
+                if moved.is_none() {
+                    moved = Some(self.ends.clone());
+                }
+                if let Some(ends) = &mut moved {
+                    ends.set_bundle::<I>(bundle, &to, left);
+                }
+            }
         }
-        self.ends.join();
+        if let Some(ends) = &mut moved {
+            ends.join();
+        }
+        (moved, free)
     }
 }
 
-/// The shares of the ways from one point to those `asked` of a tile that are clear.
+/// The shares of the ways from one point to those `asked` of a tile that are clear, and where all of it is.
 pub(super) struct Depart<'a> {
     pub(super) rise: &'a Rise,
     pub(super) from: Vec3,
@@ -130,11 +162,11 @@ pub(super) struct Depart<'a> {
 }
 
 impl Kernel for Depart<'_> {
-    type Output = [[f32; BUNDLE]; BUNDLES];
+    type Output = (Shares, Lanes);
 
     #[inline(always)]
-    fn run<I: Isa>(self) -> [[f32; BUNDLE]; BUNDLES] {
-        let mut shares = [[0.0; BUNDLE]; BUNDLES];
+    fn run<I: Isa>(self) -> (Shares, Lanes) {
+        let (mut shares, mut free) = ([[0.0; BUNDLE]; BUNDLES], [0; BUNDLES]);
         let from = splat::<I>(self.from);
         let mut numbers = [I::Sixteen::splat(0.0); NUMBERS];
         for k in 0..NUMBERS {
@@ -144,10 +176,12 @@ impl Kernel for Depart<'_> {
             if self.asked[bundle] != 0 {
                 let at = self.ends.bundle::<I>(bundle);
                 let d = [at[0].sub(from[0]), at[1].sub(from[1]), at[2].sub(from[2])];
-                share::<I>(&numbers, &d).store(&mut shares[bundle]);
+                let (share, clear) = share::<I>(&numbers, &d);
+                share.store(&mut shares[bundle]);
+                free[bundle] = self.asked[bundle] & clear as u16;
             }
         }
-        shares
+        (shares, free)
     }
 }
 
@@ -158,8 +192,8 @@ fn splat<I: Isa>(p: Vec3) -> [I::Sixteen; 3] {
 
 /// What [`Rise::clear`] gives, for sixteen ways; no fused operation, so that all paths give the same.
 #[inline(always)]
-fn share<I: Isa>(numbers: &[I::Sixteen; NUMBERS], d: &[I::Sixteen; 3]) -> I::Sixteen {
-    let [gx, gy, gz, wrong, xx, yy, zz, yz, xz, xy, bent_wrong, third, reach] = *numbers;
+fn share<I: Isa>(numbers: &[I::Sixteen; NUMBERS], d: &[I::Sixteen; 3]) -> (I::Sixteen, u32) {
+    let [gx, gy, gz, wrong, xx, yy, zz, yz, xz, xy, bent_wrong, third, reach, above] = *numbers;
     let [x, y, z] = *d;
     let (zero, one, half) = (I::Sixteen::splat(0.0), I::Sixteen::splat(1.0), I::Sixteen::splat(0.5));
     let extent = x.abs().add(y.abs()).add(z.abs());
@@ -176,5 +210,6 @@ fn share<I: Isa>(numbers: &[I::Sixteen; NUMBERS], d: &[I::Sixteen; 3]) -> I::Six
     let share = slope.add(slope).div(size).select(falls).add(half.mul(size).div(third).select(!falls));
     // Of a way without length neither is a number, and the other counts.
     let share = reach.div(length).min(share.min(one));
-    share.mul(I::Sixteen::splat(MARGIN)).select(zero.less(slope))
+    let share = share.mul(I::Sixteen::splat(MARGIN)).select(zero.less(slope));
+    (share, above.less(share.mul(slope)))
 }

@@ -115,7 +115,7 @@ fn the_share_of_a_way_that_is_called_clear_meets_nothing() {
         let turned = DMat3::from_cols(DVec3::new(0.6, 0.8, 0.0), DVec3::new(0.8, -0.6, 0.0), DVec3::Z * 1.3) * 0.3;
         let object = Harmonic::new(star, DVec3::new(0.2, 0.1, -0.4), turned).unwrap();
         let geometry = Geometry::new(Mesh::new(&[]), Vec::new(), Vec::new()).with_harmonics(vec![object.clone()]);
-        let (mut whole, mut rising) = (0.0, 0);
+        let (mut whole, mut rising, mut endless) = (0.0, 0, 0);
         for _ in 0..400 {
             let (at, normal, _) = object.point(sphere(rng.uniform2()));
             let origin = geometry.lift(at, normal);
@@ -123,8 +123,11 @@ fn the_share_of_a_way_that_is_called_clear_meets_nothing() {
             assert!(beside.near && !beside.inside);
             for _ in 0..20 {
                 let direction = sphere(rng.uniform2());
-                let clear = f64::from(beside.clear(direction.as_vec3()));
                 let met = object.first_crossing(&Ray { origin, direction });
+                let clear = beside.clear(direction.as_vec3()).map(f64::from);
+                endless += usize::from(clear.is_none());
+                assert!(clear.is_some() || met.is_none(), "{origin} {direction}: above all, and {met:?}");
+                let clear = clear.unwrap_or(1.0);
                 assert!(met.is_none_or(|met| met >= clear), "{origin} {direction}: {clear} {met:?}");
                 if direction.dot(normal) > 0.1 {
                     (whole, rising) = (whole + clear, rising + 1);
@@ -132,6 +135,8 @@ fn the_share_of_a_way_that_is_called_clear_meets_nothing() {
             }
         }
         assert!(whole > 0.01 * f64::from(rising), "degree {degree}: {whole} of {rising}");
+        // Half of all directions rise; a ball is below all of its tangent planes.
+        assert!(endless > if degree == 0 { 3000 } else { 20 }, "degree {degree}: {endless} of 8000");
     }
 }
 
@@ -153,9 +158,14 @@ fn exact_roots_are_where_steps_lead() {
                 // A crossing is known as well as F is, over its slope.
                 let slope = star.height(o + at * d, d).along.first.abs();
                 assert!((at - crossing.distance).abs() * slope < 1e-12, "{at} {}", crossing.distance);
+                let on = 1e-11 + 1e-12 / slope;
+                assert!(star.is_crossed(o, d, crossing.distance + on) && !star.is_crossed(o, d, crossing.distance - on));
                 met += 1;
             }
-            (None, None) => missed += 1,
+            (None, None) => {
+                assert!(!star.is_crossed(o, d, 6.0));
+                missed += 1;
+            }
             (root, crossing) => panic!("{root:?} by roots, {crossing:?} by steps"),
         }
     }
