@@ -1,5 +1,6 @@
 //! Luminaires with their openings: the right lux near by and far off, and the right luminance in the eye.
 
+use crate::gltf_builder::Builder;
 use crate::meshes::boxed_mesh;
 use crate::scenes::{SOMEWHERE, UP, assert_near, boxed, compare_both_ends, luminaire, lux, planned};
 use crate::{bytes, photometry};
@@ -12,6 +13,7 @@ use lampyris::scene::Scene;
 use lampyris::transport::direct::from_panels;
 use lampyris::transport::receiver::{Receiver, Response, look};
 use lampyris::validate::scenes::{point, spot_camera};
+use serde_json::json;
 
 pub const SHAPES: [&str; 8] = [
     "rectangle",
@@ -251,6 +253,31 @@ fn where_the_opening_of_the_file_has_no_area_a_point_shines_and_is_mentioned() {
             !sized(size, "extent = \"point\"").unwrap().1.scene.warnings.iter().any(|w| w.contains("no area")),
             "{size}"
         );
+    }
+}
+
+#[test]
+fn an_opening_in_the_plane_of_a_surface_is_mentioned() {
+    let mut builder = Builder::new();
+    let ceiling = [[-3.0, 2.5, -2.0], [3.0, 2.5, -2.0], [0.0, 2.5, 4.0]];
+    let mesh = builder.mesh(&ceiling, None);
+    builder.node(json!({ "name": "ceiling", "mesh": mesh }));
+    let mentioned = |file: &str, more: &str| {
+        let job = format!("scene = \"s.glb\"\n{}", luminaire(file, more));
+        let plan = planned(&job, &[("s.glb", builder.glb())]).unwrap_or_else(|e| panic!("{e}")).1;
+        plan.scene.warnings.iter().any(|w| w.contains("at [0.300, 2.500, -0.200] lies in the plane of a surface"))
+    };
+    for (file, more, expected) in [
+        ("opening_rectangle.ies", "position = [0.3, 2.5, -0.2]", true),
+        ("opening_disc.ies", "position = [0.3, 2.5, -0.2]\naim = [0, 1, 0]", true),
+        ("opening_disc.ies", "position = [0.3, 2.499, -0.2]", false),
+        ("opening_disc.ies", "position = [0.3, 2.501, -0.2]", false),
+        // Through the ceiling, not in its plane; and what has no opening, or sides.
+        ("opening_disc_upright.ies", "position = [0.3, 2.5, -0.2]", false),
+        ("opening_disc.ies", "position = [0.3, 2.5, -0.2]\nextent = \"point\"", false),
+        ("opening_box.ies", "position = [0.3, 2.5, -0.2]", false),
+    ] {
+        assert_eq!(mentioned(file, more), expected, "{file} {more}");
     }
 }
 
