@@ -244,6 +244,11 @@ fn ext_lights_ies_shines_along_minus_z_with_c0_along_x() {
         let names: Vec<&str> = plan.inputs.iter().map(|i| i.name.as_str()).collect();
         assert!(source_is_kept(&names, &builder), "{names:?}");
     }
+    // A point, even of a file with an opening.
+    let light = json!({ "EXT_lights_ies": { "light": 0 } });
+    let builder = gltf_scene(Some(json!({ "lights": [{ "uri": "opening_box.ies" }] })), json!({ "extensions": light }));
+    let (scene, _) = planned("# opening_box.ies\nscene = \"s.glb\"\n", &[("s.glb", builder.glb())]).unwrap();
+    assert_eq!((scene.sources.lights.len(), scene.sources.panels.len()), (1, 0));
     // A mirrored node mirrors the light: C90 to -Y.
     let light = json!({ "EXT_lights_ies": { "light": 0 } });
     let node = json!({ "scale": [1.0, -1.0, 1.0], "extensions": light });
