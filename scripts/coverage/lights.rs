@@ -1,14 +1,14 @@
 //! Light that is sampled because there is much of it, or because it has an extent: many lights, many luminous areas, luminaires with the
-//! opening of their file, spheres, a sky behind a window.
+//! opening of their file or a mesh, spheres, a sky behind a window.
 
 use super::cases::{camera, measured, tables};
 use super::count::{Counted, count};
 use super::replicate::Kind;
 use lampyris::error::Result;
 use lampyris::job::Job;
-use lampyris::math::DVec3;
-use lampyris::scene::Model;
+use lampyris::math::{DMat4, DVec3};
 use lampyris::scene::photometric_web::Photometry;
+use lampyris::scene::{Model, Node};
 use lampyris::validate::experiment::Experiment;
 use lampyris::validate::scenes::{
     UP, add_quad, add_quad_with_hole, box_walls, closed_box, enclosure, lambert, omni, point,
@@ -20,10 +20,23 @@ const HALL: DVec3 = DVec3::new(12.0, 3.0, 8.0);
 const WEB: &str = "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 7 1 1 2 0.3 0.6 0\n1 1 20\n0 15 30 45 60 75 90\n0\n\
                    300 310 330 300 200 80 0\n";
 
-/// All cases, printed as they come.
-pub fn run(replicates: u64, mut done: impl FnMut(&[Counted])) -> Result<Vec<Counted>> {
+/// What is counted, of so many replicates.
+type Case = fn(u64) -> Result<Vec<Counted>>;
+/// The cases and what they are called.
+pub const CASES: [(&str, Case); 7] = [
+    ("points", many_points),
+    ("areas", many_areas),
+    ("opening", opening),
+    ("openings", many_openings),
+    ("mesh", mesh),
+    ("spheres", spheres),
+    ("window", window),
+];
+
+/// All cases, or the one called `only`, printed as they come.
+pub fn run(only: Option<&str>, replicates: u64, mut done: impl FnMut(&[Counted])) -> Result<Vec<Counted>> {
     let mut all = Vec::new();
-    for case in [many_points, many_areas, opening, many_openings, spheres, window] {
+    for (_, case) in CASES.into_iter().filter(|(name, _)| only.is_none_or(|only| only == *name)) {
         let counted = case(replicates)?;
         done(&counted);
         all.extend(counted);
@@ -75,6 +88,10 @@ fn many_openings(n: u64) -> Result<Vec<Counted>> {
     hall("60 luminaires with openings in a hall, rqmc, 32 x 32", with_openings(places(10, 6))?, "", n)
 }
 
+fn mesh(n: u64) -> Result<Vec<Counted>> {
+    hall("two luminaires with luminous meshes in a hall, rqmc, 32 x 32", with_meshes(places(2, 1))?, "", n)
+}
+
 /// Balls below the ceiling, which hide one another, and one that stands on the floor between the wall and the meter beside it.
 fn spheres(n: u64) -> Result<Vec<Counted>> {
     let sphere = |[x, y, z]: [f64; 3]| {
@@ -102,15 +119,38 @@ fn window(n: u64) -> Result<Vec<Counted>> {
 
 /// The hall with a luminaire at each of `places`.
 fn with_openings(places: impl Iterator<Item = DVec3>) -> Result<Model> {
+    let entries = places.map(|place| format!("position = {:?}\nextent = \"opening\"", place.to_array()));
+    hung(closed_box(HALL, &lambert(0.5, 0.0)), entries)
+}
+
+/// The same with a box of the scene, larger than the opening of the file, in the place of each.
+fn with_meshes(places: impl Iterator<Item = DVec3>) -> Result<Model> {
     let mut model = closed_box(HALL, &lambert(0.5, 0.0));
+    let (size, mut names) = (DVec3::new(1.2, 0.15, 0.3), Vec::new());
+    let mut add_node = |model: &mut Model, name: &str| {
+        let world = DMat4::IDENTITY;
+        let index = model.nodes.list.len();
+        model.nodes.list.push(Node { index, name: Some(name.to_owned()), parent: None, world });
+        model.nodes.of_triangle.resize(model.triangles.len(), index as u32);
+        names.push(name.to_owned());
+    };
+    add_node(&mut model, "walls");
+    for (i, place) in places.enumerate() {
+        for [origin, u, v] in box_walls(size) {
+            add_quad(&mut model, place - 0.5 * size + origin, u, v, lambert(0.0, 0.0));
+        }
+        add_node(&mut model, &format!("lamp {i}"));
+    }
+    hung(model, names[1..].iter().map(|name| format!("mesh = \"{name}\"")))
+}
+
+/// `model` with a luminaire for each of `entries`.
+fn hung(mut model: Model, entries: impl Iterator<Item = String>) -> Result<Model> {
     let web = Photometry::parse("web", WEB.as_bytes())?;
-    for place in places {
-        let entry = format!(
-            "scene = \"hall\"\n[[luminaire]]\nfile = \"web\"\nposition = {:?}\nextent = \"opening\"\n{}",
-            place.to_array(),
-            point("p", [1.0; 3], UP)
-        );
-        let job = Job::parse(&entry, "hall")?;
+    for entry in entries {
+        let receiver = point("p", [1.0; 3], UP);
+        let job = format!("scene = \"hall\"\n[[luminaire]]\nfile = \"web\"\n{entry}\n{receiver}");
+        let job = Job::parse(&job, "hall")?;
         model.hang(("hall", "luminaire[0]"), &job.luminaires[0], &web)?;
     }
     Ok(model)

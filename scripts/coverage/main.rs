@@ -3,12 +3,12 @@
 //! ```text
 //! cargo run --release --example coverage -- edge SAMPLING KERNEL REPLICATES      lux-meters and a pixel at an edge
 //! cargo run --release --example coverage -- cases REPLICATES                     small cases of every kind
-//! cargo run --release --example coverage -- lights REPLICATES                    many lights, lights with an extent
+//! cargo run --release --example coverage -- lights [CASE] REPLICATES             many lights, lights with an extent
 //! cargo run --release --example coverage -- surfaces REPLICATES                  opal, panes, mirrors, glass, tables, textures
 //! cargo run --release --example coverage -- convergence SAMPLING SEEDS           no floor beside a column
 //! ```
 //!
-//! SAMPLING is rqmc, random or thinned, KERNEL bounded or plain. Tables go to the terminal as Markdown; docs/coverage.md holds a
+//! SAMPLING is rqmc, random or thinned, KERNEL bounded or plain, CASE points, areas, opening, openings, mesh, spheres or window. Tables go to the terminal as Markdown; docs/coverage.md holds a
 //! record.
 
 mod cases;
@@ -34,7 +34,11 @@ fn main() {
 }
 
 fn run(words: &[&str]) -> Result<()> {
-    let allowed = "edge SAMPLING KERNEL REPLICATES, cases REPLICATES, lights REPLICATES, surfaces REPLICATES, convergence SAMPLING SEEDS";
+    let names = lights::CASES.map(|(name, _)| name);
+    let allowed = format!(
+        "edge SAMPLING KERNEL REPLICATES, cases REPLICATES, lights [{}] REPLICATES, surfaces REPLICATES, convergence SAMPLING SEEDS",
+        names.join("|")
+    );
     let last = words.last().and_then(|w| w.parse::<u64>().ok()).filter(|&n| n > 1);
     match (words, last) {
         (["edge", sampling, kernel @ ("bounded" | "plain"), _], Some(n)) => {
@@ -49,9 +53,9 @@ fn run(words: &[&str]) -> Result<()> {
             marks::print(&cases::run(n, print)?);
             Ok(())
         }
-        (["lights", _], Some(n)) => {
+        (["lights", only @ .., _], Some(n)) if only.iter().all(|name| names.contains(name)) && only.len() < 2 => {
             println!("{}", Counted::HEAD);
-            marks::print(&lights::run(n, print)?);
+            marks::print(&lights::run(only.first().copied(), n, print)?);
             Ok(())
         }
         (["surfaces", _], Some(n)) => {

@@ -144,10 +144,10 @@ pub struct Luminaire {
     /// Another, 0 ..= 1.
     #[serde(default = "one")]
     pub dimming: f64,
-    /// What shines: a point, or the luminous opening that the file describes.
+    /// What shines: the luminous opening that the file describes, or a point.
     #[serde(default)]
     pub extent: Extent,
-    /// Node of the scene whose mesh, and what hangs below, shines in the place of a point; left out: as `extent` says.
+    /// Node of the scene whose mesh, and what hangs below, shines in the place of both; left out: as `extent` says.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mesh: Option<String>,
     /// Flux to which the web is scaled before the two factors \[lm\]; left out: as the file has it.
@@ -159,10 +159,12 @@ pub struct Luminaire {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Extent {
-    /// A point: right from some five times its size on.
+    /// The opening in the file where it has an area, else a point.
     #[default]
+    File,
+    /// A point: right from some five times its size on.
     Point,
-    /// The opening in the file, with the luminance that its intensities ask for.
+    /// The opening in the file, with the luminance that its intensities ask for; a file without one is refused.
     Opening,
 }
 
@@ -276,8 +278,8 @@ fn check_luminaire(c: &Checker, at: &str, luminaire: &Luminaire, has_scene: bool
     }
     if let Some(mesh) = &luminaire.mesh {
         c.that(&format!("{at}.mesh"), mesh, has_scene, "a mesh only with a scene")?;
-        let alone = luminaire.extent == Extent::Point;
-        c.that(&format!("{at}.extent"), "opening", alone, "left out beside a mesh, which is what shines")?;
+        let (alone, said) = (luminaire.extent == Extent::File, format!("{:?}", luminaire.extent).to_lowercase());
+        c.that(&format!("{at}.extent"), said, alone, "left out beside a mesh, which is what shines")?;
     }
     let placed = luminaire.node.is_some() || luminaire.position.is_some() || luminaire.mesh.is_some();
     c.that(&format!("{at}.position"), "(missing)", placed, "a position, a node or a mesh")?;

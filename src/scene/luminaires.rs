@@ -1,6 +1,6 @@
 //! The lights of a job, hung into the scene.
 
-use super::photometric_web::{Luminaire, Photometry, Placement};
+use super::photometric_web::{Luminaire, Photometry, Placement, Shape};
 use super::{Extended, Light, Model, Reflectance, Surface};
 use crate::error::{Error, Result};
 use crate::job;
@@ -74,18 +74,38 @@ impl Model {
         }
         let factor = Colour::grey(scale * luminaire.multiplier * luminaire.dimming);
         let light = Luminaire::new(photometry, &placement, factor);
-        match (mesh, luminaire.extent) {
-            (Some(mesh), _) => self.add_faces(Extended::of_mesh(light, mesh)),
-            (None, job::Extent::Point) => self.lights.push(Light::Luminaire(light)),
-            (None, job::Extent::Opening) => {
-                let extended = Extended::new(light, &photometry.opening, &placement).ok_or_else(|| {
-                    let allowed = "point: its file gives no luminous opening with an area";
-                    Error::input(job, format!("{at}.extent"), "opening", allowed)
-                })?;
-                self.add_faces(extended);
-            }
+        if let Some(mesh) = mesh {
+            self.add_faces(Extended::of_mesh(light, mesh));
+        } else if let Some(extended) = self.opened((job, at), luminaire, photometry, (&light, &placement))? {
+            self.add_faces(extended);
+        } else {
+            self.lights.push(Light::Luminaire(light));
         }
         Ok(())
+    }
+
+    /// `light` with the opening of its file; `None` where a point shines.
+    fn opened(
+        &mut self,
+        (job, at): (&str, &str),
+        luminaire: &job::Luminaire,
+        photometry: &Photometry,
+        (light, placement): (&Luminaire, &Placement),
+    ) -> Result<Option<Extended>> {
+        if luminaire.extent == job::Extent::Point {
+            return Ok(None);
+        }
+        let extended = Extended::new(light.clone(), &photometry.opening, placement);
+        if extended.is_none() && luminaire.extent == job::Extent::Opening {
+            let allowed = "point: its file gives no luminous opening with an area";
+            return Err(Error::input(job, format!("{at}.extent"), "opening", allowed));
+        }
+        // A file that gives none means a point; one that gives a line, or signs of no edition, means something else.
+        if extended.is_none() && photometry.opening.shape != Shape::Point {
+            let file = &luminaire.file;
+            self.warn(format!("luminaire {file}: its luminous opening has no area that is known: a point shines"));
+        }
+        Ok(extended)
     }
 
     /// Adds a luminaire with extent, whose faces absorb what meets them.

@@ -88,6 +88,11 @@ impl Panel {
         Panel { luminaire, faces, area, flat }
     }
 
+    /// Whether it is flat, and shines on both sides.
+    pub fn is_flat(&self) -> bool {
+        self.flat
+    }
+
     /// Luminance towards the unit vector `w` \[cd/m2\].
     pub fn luminance(&self, w: DVec3) -> Colour {
         let shown = self.shown(w);

@@ -7,7 +7,9 @@ use crate::place::{Place, plan_in};
 use crate::process::{expect, lampyris, run_quietly, work};
 use lampyris::farm::durable::Step;
 use lampyris::geometry::simd;
-use lampyris::scene::gltf;
+use lampyris::scene::textures::Coverage;
+use lampyris::scene::{Light, gltf};
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -29,14 +31,15 @@ const OF_SURFACES: (&str, &str) = (
 );
 const FLOOR: &str = "lampyris-brdf 1\nchannels 1\ntheta 0 80\nphi 0 180\n0.1 0.1\n0.1 0.1\n0.1 0.1\n0.1 0.4\n";
 /// Every kind of light, and of most kinds so many that they are chosen: parallel light and a sky, an opening to aim at, more than 16 lights
-/// without extent, more than 64 emissive triangles, spheres, a luminaire of every shape, and a mesh that shines.
+/// without extent, photometric webs of the job and of the scene among them, more than 64 emissive triangles, spheres, a luminaire of every
+/// shape, and a mesh that shines.
 fn of_lights() -> String {
     let omni = |i: u32| {
         let x = 0.4 + 0.25 * f64::from(i);
         format!("[[source]]\nkind = \"omni\"\nposition = [{x}, 2.2, -0.4]\nintensity = {}\n", 1 + i % 3)
     };
     let luminaire = |(i, file): (usize, &&str)| {
-        let (x, z) = (0.7 + 0.6 * i as f64, -3.2);
+        let (x, z) = (0.7 + 0.5 * i as f64, -3.2);
         format!(
             "[[luminaire]]\nfile = \"{file}\"\nposition = [{x}, 2.0, {z}]\nextent = \"opening\"\nmultiplier = 0.1\n"
         )
@@ -47,7 +50,7 @@ fn of_lights() -> String {
 }
 
 /// Files of luminaires of tests/luminaires.
-const OPENINGS: [&str; 7] = [
+const OPENINGS: [&str; 8] = [
     "opening_rectangle.ies",
     "opening_disc.ies",
     "opening_box.ies",
@@ -55,7 +58,10 @@ const OPENINGS: [&str; 7] = [
     "opening_cylinder_along_c0.ies",
     "opening_cylinder_across_c0.ies",
     "opening_sphere.ies",
+    "opening_disc_upright.ies",
 ];
+/// The file of EXT_lights_ies.
+const OF_SCENE: &str = "wedge.ies";
 const LIGHTS: &str = "\
 [sky]
 model = 12
@@ -107,6 +113,11 @@ exponent = 4
 [[luminaire]]
 file = \"opening_box.ies\"
 mesh = \"book\"
+[[luminaire]]
+file = \"opening_rectangle.ies\"
+position = [3.5, 2, -0.8]
+aim = [0.2, -1, 0.1]
+extent = \"point\"
 ";
 /// The one sky that the variant of all lights has not.
 const OF_SKY: (&str, &str) = ("[[camera]]\n", "[sky]\nmodel = \"uniform\"\nzenith_luminance = 1000\n[[camera]]\n");
@@ -136,15 +147,46 @@ const VARIANTS: [Variant; 7] = [
 fn place() -> Place {
     let place = Place::new();
     let webs = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/luminaires");
-    for file in OPENINGS {
+    for file in OPENINGS.into_iter().chain([OF_SCENE]) {
         fs::copy(webs.join(file), place.path(file)).unwrap();
     }
     let scene = fs::read(place.path("room.glb")).unwrap();
     fs::write(place.path("floor.brdf"), FLOOR).unwrap();
-    for (name, digit) in [("dull.glb", b'9'), ("peaked.glb", b'1')] {
-        fs::write(place.path(name), polished(scene.clone(), digit)).unwrap();
-    }
+    fs::write(place.path("dull.glb"), polished(scene.clone(), b'9')).unwrap();
+    fs::write(place.path("peaked.glb"), edited(&polished(scene.clone(), b'1'), veiled)).unwrap();
+    fs::write(place.path("lit.glb"), edited(&scene, lit)).unwrap();
     place
+}
+
+/// The same scene with its JSON changed.
+fn edited(glb: &[u8], change: impl FnOnce(&mut Value)) -> Vec<u8> {
+    let length = |at: usize| u32::from_le_bytes(glb[at..at + 4].try_into().unwrap()) as usize;
+    let (json, others) = glb[20..].split_at(length(12));
+    let mut json: Value = serde_json::from_slice(json).unwrap();
+    change(&mut json);
+    let mut text = json.to_string().into_bytes();
+    text.resize(text.len().next_multiple_of(4), b' ');
+    let lengths = [20 + text.len() + others.len(), text.len()].map(|n| (n as u32).to_le_bytes());
+    [&glb[..8], &lengths[0], &lengths[1], b"JSON", &text, others].concat()
+}
+
+/// The one of `list` called `name`.
+fn called<'a>(list: &'a mut Value, name: &str) -> &'a mut Value {
+    list.as_array_mut().unwrap().iter_mut().find(|entry| entry["name"] == name).unwrap()
+}
+
+/// Half of what meets the rug, which has a texture, goes through.
+fn veiled(json: &mut Value) {
+    let rug = called(&mut json["materials"], "rug");
+    rug["alphaMode"] = "BLEND".into();
+    rug["pbrMetallicRoughness"]["baseColorFactor"] = json!([1.0, 1.0, 1.0, 0.5]);
+}
+
+/// A web of EXT_lights_ies beside the spot of the shelf.
+fn lit(json: &mut Value) {
+    json["extensionsUsed"].as_array_mut().unwrap().push("EXT_lights_ies".into());
+    json["extensions"]["EXT_lights_ies"] = json!({ "lights": [{ "uri": OF_SCENE }] });
+    called(&mut json["nodes"], "shelf spot")["extensions"]["EXT_lights_ies"] = json!({ "light": 0, "multiplier": 2.0 });
 }
 
 /// The same scene with another roughness, 0.`digit`, of all materials that are not matt.
@@ -243,7 +285,7 @@ fn every_variant_is_exact() {
 #[test]
 fn every_kind_of_light_is_exact_with_all_instructions() {
     let lights = of_lights() + "[[camera]]\n";
-    let changes = [("[[camera]]\n", lights.as_str())];
+    let changes = [("[[camera]]\n", lights.as_str()), ("room.glb", "lit.glb")];
     assert_exact("lights", &changes);
     let place = place();
     let job = job_of(&place, "lights", &changes);
@@ -273,13 +315,16 @@ fn variants_are_what_they_are_called() {
     // Each set has a bound of its own; the region, the last of them, is made of pixels.
     assert!(open.len() == 5 && open[..4].iter().all(|b| b.is_finite()) && open[0] != open[2], "{open:?}");
     assert!(plain.is_empty() && reverse.is_empty());
-    let peaked = |scene: &str| {
+    let model = |scene: &str| {
         let bytes = fs::read(place.path(scene)).unwrap();
-        let model = gltf::load(scene, &bytes, &mut |_| unreachable!("all is in one file")).unwrap();
-        model.surfaces.iter().filter(|s| s.reflectance.is_peaked()).count()
+        gltf::load(scene, &bytes, &mut |beside| Ok(fs::read(place.path(beside)).unwrap())).unwrap()
     };
+    let peaked = |scene: &str| model(scene).surfaces.iter().filter(|s| s.reflectance.is_peaked()).count();
     // Steel and glazed clay of the room are peaked; floor, oak, lacquer and apple become so.
     assert_eq!(["dull.glb", "room.glb", "peaked.glb"].map(peaked), [0, 2, 6]);
+    let [veiled, lit] = ["peaked.glb", "lit.glb"].map(model);
+    assert!(veiled.textures.of_surface.iter().flatten().any(|t| t.coverage == Coverage::Blend));
+    assert!(lit.lights.iter().any(|light| matches!(light, Light::Luminaire(_))));
 }
 
 #[test]

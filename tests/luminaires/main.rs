@@ -11,6 +11,7 @@ mod openings;
 mod reading;
 mod sampling;
 mod scenes;
+mod tilt;
 
 use lampyris::math::{DMat3, DVec3};
 use lampyris::photometry::Colour;

@@ -3,13 +3,15 @@
 use crate::gltf_builder::Builder;
 use crate::openings::{SHAPES, sampled, shown};
 use crate::photometry;
-use crate::scenes::{assert_near, luminaire, lux, planned};
+use crate::scenes::{IN_BOX, assert_near, boxed_with, luminaire, lux, planned};
 use lampyris::farm::realization::Realization;
 use lampyris::math::{DVec3, acos, atan2};
 use lampyris::random::{Domain, Generator, Stream, sphere};
-use lampyris::scene::Scene;
+use lampyris::scene::photometric_web::Photometry;
+use lampyris::scene::{Scene, gltf};
 use lampyris::transport::direct::from_panels;
 use lampyris::transport::receiver::{Receiver, Response};
+use lampyris::validate::Experiment;
 use lampyris::validate::scenes::spot_camera;
 use serde_json::json;
 
@@ -56,6 +58,17 @@ fn job(more: &str) -> String {
 
 fn shining(corners: &[[f32; 3]], triangles: &[u16]) -> Scene {
     planned(&job("mesh = \"lamp\""), &[("s.glb", with_mesh(corners, triangles))]).unwrap_or_else(|e| panic!("{e}")).0
+}
+
+/// A closed box around a luminaire that is a box of the scene, askew to the web and so large that paths find it.
+pub fn boxed_mesh(web: &Photometry, reflectance: f64, job: &str) -> Experiment {
+    let mut builder = Builder::new();
+    let mesh = builder.mesh(&CORNERS, Some(&CUBE));
+    let (half, size) = (0.5f64.sqrt(), SIZE.map(|length| 3.0 * length));
+    let turned = json!([0.3, half, 0.2, (0.5f64 - 0.13).sqrt()]);
+    builder.node(json!({ "name": "lamp", "mesh": mesh, "translation": IN_BOX, "rotation": turned, "scale": size }));
+    let model = gltf::load("lamp.glb", &builder.glb(), &mut |_| unreachable!("all is in one file")).unwrap();
+    boxed_with(model, web, "mesh = \"lamp\"", reflectance, job)
 }
 
 /// Intensity of `file` towards `w`, aim down and C0 along +X \[cd\].
@@ -136,6 +149,7 @@ fn meshes_that_cannot_shine_are_refused_by_name() {
             "luminaire[0].mesh = lamp: a flat mesh whose faces all look the same",
         ),
         ("mesh = \"lamp\"\nextent = \"opening\"", cube(), "luminaire[0].extent = opening: left out beside a mesh"),
+        ("mesh = \"lamp\"\nextent = \"point\"", cube(), "luminaire[0].extent = point: left out beside a mesh"),
     ] {
         let error = refused(more, glb);
         assert!(error.contains(expected), "{expected}: {error}");

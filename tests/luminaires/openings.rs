@@ -1,13 +1,19 @@
 //! Luminaires with their openings: the right lux near by and far off, and the right luminance in the eye.
 
-use crate::scenes::{UP, assert_near, boxed, compare_both_ends, luminaire, lux, planned};
+use crate::gltf_builder::Builder;
+use crate::meshes::boxed_mesh;
+use crate::scenes::{SOMEWHERE, UP, assert_near, boxed, compare_both_ends, luminaire, lux, planned};
 use crate::{bytes, photometry};
+use lampyris::farm::plan::Plan;
+use lampyris::farm::realization::Realization;
 use lampyris::geometry::Ray;
 use lampyris::math::{DVec3, PI};
 use lampyris::random::{Domain, Generator, Stream, sphere};
 use lampyris::scene::Scene;
 use lampyris::transport::direct::from_panels;
 use lampyris::transport::receiver::{Receiver, Response, look};
+use lampyris::validate::scenes::{point, spot_camera};
+use serde_json::json;
 
 pub const SHAPES: [&str; 8] = [
     "rectangle",
@@ -117,24 +123,24 @@ fn the_eye_sees_intensity_over_shown_area_in_twenty_directions() {
     }
 }
 
-/// The scene of the lamp `full.ies` whose file gives an opening of this width, length and height.
-fn with_opening(size: &str, extent: &str) -> lampyris::error::Result<Scene> {
+/// The lamp `full.ies` whose file gives an opening of this width, length and height; `extent` is a line of its job, or none.
+fn sized(size: &str, extent: &str) -> lampyris::error::Result<(Scene, Plan)> {
     let text = String::from_utf8(bytes("full.ies")).unwrap();
     let text = text.replace("1 -1 1 13 13 1 2 0 0 0", &format!("1 -1 1 13 13 1 2 {size}"));
-    let job = luminaire("sized.ies", &format!("position = [0, 0, 0]\nextent = \"{extent}\""));
-    planned(&job, &[("sized.ies", text.into_bytes())]).map(|(scene, _)| scene)
+    let job = luminaire("sized.ies", &format!("position = [0, 0, 0]\n{extent}"));
+    planned(&job, &[("sized.ies", text.into_bytes())])
 }
 
 #[test]
 fn an_opening_without_an_area_is_refused_and_shines_as_a_point() {
     // A point, a line, and signs that no edition has.
     for size in ["0 0 0", "0 1.2 0", "0 -1 -2", "1 1 -1"] {
-        let refusal = with_opening(size, "opening").err().unwrap().to_string();
+        let refusal = sized(size, "extent = \"opening\"").err().unwrap().to_string();
         assert!(refusal.contains("no luminous opening with an area"), "{size}: {refusal}");
-        assert!(with_opening(size, "point").is_ok(), "{size}");
+        assert!(sized(size, "extent = \"point\"").is_ok(), "{size}");
     }
     // A box without depth has two sides.
-    let scene = with_opening("0 1.2 0.3", "opening").unwrap();
+    let scene = sized("0 1.2 0.3", "extent = \"opening\"").unwrap().0;
     let receiver = meter(&scene, [0.0, 0.0, 2.0], [0.0, 0.0, -1.0]);
     let lit = from_panels(&scene, &receiver, 64, &mut random("flat")).luminance();
     assert!(lit > 10.0, "{lit} lx");
@@ -162,10 +168,11 @@ fn far_off_an_opening_lights_as_a_point() {
 }
 
 #[test]
-fn the_lux_on_the_walls_of_a_closed_box_sum_up_to_the_flux_of_an_opening() {
+fn the_lux_on_the_walls_of_a_closed_box_sum_up_to_the_flux_of_an_opening_and_of_a_mesh() {
     let size = [3.0, 2.0, 4.0];
-    for shape in SHAPES {
-        let experiment = boxed(&photometry(&format!("opening_{shape}.ies")), "opening", 0.0, super::scenes::SOMEWHERE);
+    let of_file = |shape| (shape, boxed(&photometry(&format!("opening_{shape}.ies")), "opening", 0.0, SOMEWHERE));
+    let of_mesh = ("mesh", boxed_mesh(&photometry("full.ies"), 0.0, SOMEWHERE));
+    for (shape, experiment) in SHAPES.map(of_file).into_iter().chain([of_mesh]) {
         let mut rng = random(shape);
         // A random place on a random wall, in proportion to area: the sum is the mean times the whole area.
         let areas: Vec<f64> = (0..6).map(|k| size[(k / 2 + 1) % 3] * size[(k / 2 + 2) % 3]).collect();
@@ -191,7 +198,7 @@ fn the_lux_on_the_walls_of_a_closed_box_sum_up_to_the_flux_of_an_opening() {
 }
 
 #[test]
-fn light_of_an_opening_is_the_same_from_both_ends() {
+fn light_of_an_opening_and_of_a_mesh_is_the_same_from_both_ends() {
     // Reverse paths find the opening by hitting it, and see its luminance; histories leave it; receivers sample it. A flat one
     // that shines along its plane is so bright there that paths would take long: it gets the light of a Lambert surface.
     for (shape, light) in [("rectangle", "lambert_100lm.ies"), ("box", "full.ies"), ("sphere", "full.ies")] {
@@ -201,6 +208,76 @@ fn light_of_an_opening_is_the_same_from_both_ends() {
         let opening = &mut web.opening;
         [&mut opening.length, &mut opening.width, &mut opening.height].into_iter().for_each(|x| *x *= 4.0);
         compare_both_ends(shape, 2048, |job| boxed(&web, "opening", 0.6, job));
+    }
+    compare_both_ends("mesh", 2048, |job| boxed_mesh(&photometry("full.ies"), 0.6, job));
+}
+
+/// The job of one lamp among matt surfaces, near enough to an opening that it is no point, and what it gives: bits of every score.
+fn bits(file: &str, extent: &str) -> (Vec<u64>, Vec<String>) {
+    let extent = if extent.is_empty() { String::new() } else { format!("extent = \"{extent}\"\n") };
+    let job = "[run]\nhistories_per_batch = 16\nbatches = 16\n[[plane]]\npoint = [0, -1, 0]\nnormal = [0, 1, 0]\nreflectance = 0.5\n"
+        .to_owned()
+        + &luminaire(file, &format!("position = [0.0, 0.0, 0.0]\naim = [0.3, -1.0, 0.2]\n{extent}"))
+        + &point("near", [0.3, -0.6, 0.2], UP)
+        + &spot_camera("eye", [0.9, 0.9, 0.8], [0.0; 3], [0.3, 0.5, 0.8]);
+    let (scene, plan) = planned(&job, &[]).unwrap_or_else(|e| panic!("{e}"));
+    let scores = Realization::new(&plan.job, &scene, &plan.bounds).batch(0);
+    let bits = scores.sets.iter().flat_map(|set| set.value.iter().map(|x| x.to_bits())).collect();
+    (bits, plan.scene.warnings)
+}
+
+#[test]
+fn left_out_the_extent_is_the_opening_of_the_file_and_else_a_point() {
+    let opened = SHAPES.map(|shape| format!("opening_{shape}.ies"));
+    let opened = opened.iter().map(String::as_str).chain(["symmetry_4.ldt", "absolute.ldt"]);
+    for (file, meant) in
+        opened.map(|file| (file, "opening")).chain([("full.ies", "point"), ("symmetry_0.ldt", "point")])
+    {
+        let (left_out, said) = (bits(file, ""), bits(file, meant));
+        assert!(left_out.0.iter().any(|&b| f64::from_bits(b) > 0.0), "{file}");
+        assert_eq!(left_out, said, "{file}");
+        assert_eq!(left_out, bits(file, "file"), "{file}");
+        // A point is another light than an opening: the two do not agree by chance.
+        assert_eq!(left_out.0 == bits(file, "point").0, meant == "point", "{file}");
+    }
+}
+
+#[test]
+fn where_the_opening_of_the_file_has_no_area_a_point_shines_and_is_mentioned() {
+    for (size, mentioned) in [("0 0 0", false), ("0 1.2 0", true), ("0 -1 -2", true), ("1 1 -1", true)] {
+        let (scene, plan) = sized(size, "").unwrap();
+        assert_eq!((scene.sources.lights.len(), scene.sources.panels.len()), (1, 0), "{size}");
+        let said = plan.scene.warnings.iter().any(|w| w.contains("sized.ies: its luminous opening has no area"));
+        assert_eq!(said, mentioned, "{size}: {:?}", plan.scene.warnings);
+        assert!(
+            !sized(size, "extent = \"point\"").unwrap().1.scene.warnings.iter().any(|w| w.contains("no area")),
+            "{size}"
+        );
+    }
+}
+
+#[test]
+fn an_opening_in_the_plane_of_a_surface_is_mentioned() {
+    let mut builder = Builder::new();
+    let ceiling = [[-3.0, 2.5, -2.0], [3.0, 2.5, -2.0], [0.0, 2.5, 4.0]];
+    let mesh = builder.mesh(&ceiling, None);
+    builder.node(json!({ "name": "ceiling", "mesh": mesh }));
+    let mentioned = |file: &str, more: &str| {
+        let job = format!("scene = \"s.glb\"\n{}", luminaire(file, more));
+        let plan = planned(&job, &[("s.glb", builder.glb())]).unwrap_or_else(|e| panic!("{e}")).1;
+        plan.scene.warnings.iter().any(|w| w.contains("at [0.300, 2.500, -0.200] lies in the plane of a surface"))
+    };
+    for (file, more, expected) in [
+        ("opening_rectangle.ies", "position = [0.3, 2.5, -0.2]", true),
+        ("opening_disc.ies", "position = [0.3, 2.5, -0.2]\naim = [0, 1, 0]", true),
+        ("opening_disc.ies", "position = [0.3, 2.499, -0.2]", false),
+        ("opening_disc.ies", "position = [0.3, 2.501, -0.2]", false),
+        // Through the ceiling, not in its plane; and what has no opening, or sides.
+        ("opening_disc_upright.ies", "position = [0.3, 2.5, -0.2]", false),
+        ("opening_disc.ies", "position = [0.3, 2.5, -0.2]\nextent = \"point\"", false),
+        ("opening_box.ies", "position = [0.3, 2.5, -0.2]", false),
+    ] {
+        assert_eq!(mentioned(file, more), expected, "{file} {more}");
     }
 }
 

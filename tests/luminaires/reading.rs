@@ -105,16 +105,6 @@ fn lamps_and_stated_fluxes_are_compared_with_the_web() {
 }
 
 #[test]
-fn a_tilted_lamp_gives_what_its_table_says() {
-    let tilt = photometry("tilt_include.ies").tilt.unwrap();
-    for (degrees, factor) in
-        [(0.0, 1.0), (22.5, 0.95), (45.0, 0.9), (67.5, 0.8), (90.0, 0.7), (135.0, 0.9), (180.0, 1.0)]
-    {
-        assert!((tilt.factor(degrees) - factor).abs() < 1e-12, "{degrees}");
-    }
-}
-
-#[test]
 fn the_web_has_no_seam_where_its_planes_close() {
     for name in ["full.ies", "full_without_360.ies", "quadrant.ies", "half_90_270.ies", "omni_1000lm.ies"] {
         let web = photometry(name).web;

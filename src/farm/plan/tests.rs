@@ -138,6 +138,20 @@ fn the_digest_of_a_known_job_stays() {
 }
 
 #[test]
+fn what_of_a_luminaire_shines_is_in_the_plan_and_in_the_digest() {
+    let of = |extent: &str| {
+        plan_of(&format!("{JOB}[[luminaire]]\nfile = \"lamp.ies\"\nposition = [0, 2, 0]\n{extent}")).unwrap()
+    };
+    let [left_out, file, point, opening] =
+        ["", "extent = \"file\"", "extent = \"point\"", "extent = \"opening\""].map(of);
+    assert_eq!((&left_out.digest, &left_out.job), (&file.digest, &file.job));
+    assert!(toml::to_string(&left_out).unwrap().contains("extent = \"file\""));
+    // A folder planned when a point was the default holds "point", and is not taken for one of the same job now.
+    assert_eq!(left_out.differences(&point), ["luminaire[0].extent: \"point\" in the plan, \"file\" now"]);
+    assert!(point.digest != opening.digest && opening.digest != file.digest);
+}
+
+#[test]
 fn every_table_of_a_job_is_inside_the_digest() {
     const MORE: &str = r#"
 [[gonio]]

@@ -1,6 +1,7 @@
 //! EXT_lights_ies: photometric webs at nodes.
 //!
-//! The direction of the two angles 0 is the node's -Z, C0 its +X and C90 its +Y.
+//! The direction of the two angles 0 is the node's -Z, C0 its +X and C90 its +Y. The extension defines punctual lights: they are
+//! points, whatever luminous opening the file has.
 
 use super::buffers::Buffers;
 use super::document::{Document, NodeProfile, Profile};
