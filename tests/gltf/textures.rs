@@ -357,6 +357,10 @@ fn red_says_how_much_transmits_and_base_colour_metal_and_alpha_have_their_say() 
     let opaque = Reflectance::metallic_roughness(Colour::WHITE, 0.0, 0.0);
     assert_eq!(law(&scene(model), 0.75, 0.75).albedo(0.3), opaque.albedo(0.3));
 
+    // The report is of the means: 0.45 of the texture.
+    let text = lampyris::report::reflectance_text(&scene(good(&clear)));
+    assert!(text.lines().any(|line| line.contains("transmits") && line.contains(" 0.2160 ")), "{text}");
+
     let tinted = sheet(json!({ "baseColorFactor": [0.5, 1.0, 1.0, 1.0] }));
     assert_shares(through(&tinted), [0.24, 0.0, 0.144, 0.048]);
     let metal = sheet(json!({ "metallicFactor": 0.25 }));
