@@ -19,7 +19,13 @@ fn tabulated() -> Reflectance {
 
 /// A dielectric as KHR_materials_ior and KHR_materials_specular make it.
 fn specular(metallic: f64, roughness: f64) -> Reflectance {
-    Reflectance::layered(Colour::grey(0.5), metallic, roughness, Dielectric { f0: Colour::grey(0.12), f90: 0.8 })
+    let dielectric = Dielectric { f0: Colour::grey(0.12), f90: 0.8, ..Dielectric::PLAIN };
+    Reflectance::layered(Colour::grey(0.5), metallic, roughness, dielectric)
+}
+
+/// A dielectric of which the share `t` transmits.
+fn transmitting(t: f64, metallic: f64, roughness: f64) -> Reflectance {
+    Reflectance::layered(Colour::grey(0.7), metallic, roughness, Dielectric { transmission: t, ..Dielectric::PLAIN })
 }
 
 /// Every law that a flat surface may have.
@@ -39,6 +45,10 @@ fn laws() -> Vec<(&'static str, Reflectance)> {
         ("tabulated", tabulated()),
         ("opal", Reflectance::opal(share(0.4), share(0.5))),
         ("pane", Reflectance::Delta(Delta::Pane(Pane::new(1.5, share(0.9))))),
+        ("rough sheet", transmitting(0.5, 0.0, 0.6)),
+        ("polished sheet", transmitting(0.4, 0.0, 0.0)),
+        ("sheet with some metal", transmitting(0.7, 0.3, 0.4)),
+        ("sheet without a base", transmitting(1.0, 0.0, 1.0)),
     ]
 }
 
@@ -59,7 +69,8 @@ fn shown(law: &Reflectance, mu: f64) -> f64 {
         PI * law.evaluate(DVec3::Y, -to_world(DVec3::Y, cosine_hemisphere(u)), to_eye).luminance()
     };
     let finite: f64 = (0..SIDE).flat_map(|i| (0..SIDE).map(move |j| (i, j))).map(value).sum();
-    finite / f64::from(SIDE * SIDE) + law.delta_reflectance(mu).unwrap_or(Colour::BLACK).luminance()
+    let unscattered = law.delta_reflectance(mu).unwrap_or(Colour::BLACK) + law.straight(mu);
+    finite / f64::from(SIDE * SIDE) + unscattered.luminance()
 }
 
 #[test]
@@ -75,7 +86,10 @@ fn in_an_even_room_every_surface_shows_what_it_reflects_and_lets_through() {
         add_quad(&mut model, DVec3::new(0.3, 0.5, 0.3), DVec3::Z * 0.4, DVec3::X * 0.4, sheet(law.clone()));
         let cameras = eyes.iter().map(|(name, eye, _)| spot_camera(name, *eye, [0.5, 0.5, 0.5], [0.0, 0.0, 1.0]));
         // Of an eye ray that is mirrored or goes on by chance each batch sees one or the other.
-        let run = if law.has_delta() { run(4096, 1) + "sampling = \"random\"\n" } else { run(64, 512) };
+        let run = match law.has_delta() || law.is_veil() {
+            true => run(if law.is_sheet() { 16384 } else { 4096 }, 1) + "sampling = \"random\"\n",
+            false => run(64, 512),
+        };
         let values = Case::new(&(run + &cameras.collect::<String>()), model).values();
         for ((from, _, mu), value) in eyes.iter().zip(values) {
             all.push(compare(format!("{name} {from}"), value, 3.0 * shown(&law, *mu)).within(1e-4));

@@ -31,6 +31,7 @@ fn plain(base: f64) -> Textured {
         factors: [0.0, 1.0],
         data_layer: None,
         dielectric: Dielectric::PLAIN,
+        transmission_layer: None,
         emission: Colour::BLACK,
         emission_layer: None,
         uniform_law: false,
@@ -203,7 +204,7 @@ fn local_and_reverse_agree_where_everything_varies() {
         );
         Case::new(&(run + &receivers), room())
     };
-    let (local, reverse) = (case("local", 2048), case("reverse", 8192));
+    let (local, reverse) = (case("local", 1024), case("reverse", 4096));
     let names = local.job.sets().into_iter().map(|s| s.name);
     let all: Vec<_> = names
         .zip(local.values().into_iter().zip(reverse.values()))
@@ -267,6 +268,70 @@ fn local_and_reverse_agree_around_screens_and_no_light_is_lost() {
             Case::new(&(run + &receivers), room.clone())
         };
         let (local, reverse) = (case("local", 512), case("reverse", 2048));
+        let names = local.job.sets().into_iter().map(|s| s.name);
+        let mut all: Vec<_> = names
+            .zip(local.values().into_iter().zip(reverse.values()))
+            .map(|(name, (a, b))| difference(format!("{coverage:?} {name}"), a, b))
+            .collect();
+        let (_, batches) = local.batches(0..u32::MAX);
+        all.push(compare(format!("{coverage:?} absorbed"), flux(&batches, "absorbed"), PI * 60.0));
+        assert_all(&all);
+    }
+}
+
+/// A two-sided sheet that transmits as the chequers say, with holes, of 2 x 1 m in the plane y = 1/2.
+fn sheet(mut model: Model, roughness: f64, coverage: Coverage, alpha: u8) -> Model {
+    let dielectric = Dielectric { transmission: 0.8, ..Dielectric::PLAIN };
+    let quad = model.surfaces.len();
+    let uniform = Reflectance::layered(Colour::grey(0.6), 0.0, roughness, dielectric);
+    let both = Surface { reflectance: uniform, double_sided: true, ..lambert(0.0, 0.0) };
+    add_quad(&mut model, DVec3::new(0.0, 0.5, 0.0), DVec3::X * 2.0, DVec3::Z, both);
+    let textured = Textured {
+        base_layer: Some(holes(alpha)),
+        factors: [0.0, roughness],
+        dielectric,
+        transmission_layer: Some(layer(8, &chequers(), Filter::Nearest, Coding::Data)),
+        coverage,
+        ..plain(0.6)
+    };
+    varied(model, vec![(quad, textured)])
+}
+
+#[test]
+fn light_goes_through_a_sheet_as_its_transmission_and_its_alpha_say() {
+    // The first texel is bright and covers; the second is dark, and covers a fifth where alpha counts.
+    let (bright, dark) = ([0.12, 0.1, 0.13], [0.37, 0.1, 0.13]);
+    let job = "[run]\nhistories_per_batch = 16\nbatches = 16\nseed = 5\n".to_owned()
+        + &point("bright", bright, [0.0, 1.0, 0.0])
+        + &point("dark", dark, [0.0, 1.0, 0.0]);
+    let straight = |value: u8| 0.8 * stored(value) * 0.6 * 0.96;
+    for (coverage, cover) in [(Coverage::Whole, 1.0), (Coverage::Blend, 0.2), (Coverage::Mask(0.5), 0.0)] {
+        let mut model = sheet(Model::default(), 0.0, coverage, 51);
+        model.lights.push(Light::Directional { direction: DVec3::NEG_Y, illuminance: Colour::grey(100.0) });
+        let values = Case::new(&job, model).values();
+        let exact = [straight(chequers()[0][0]), 1.0 - cover + cover * straight(chequers()[1][0])];
+        for (value, exact) in values.iter().zip(exact) {
+            assert!((value.mean - 100.0 * exact).abs() < 1e-4, "{coverage:?}: {} against {exact}", value.mean);
+        }
+    }
+}
+
+#[test]
+fn local_and_reverse_agree_around_sheets_that_vary_and_no_light_is_lost() {
+    for (coverage, alpha) in [(Coverage::Whole, 255), (Coverage::Blend, 80)] {
+        let mut room = closed_box(DVec3::new(2.0, 1.0, 1.0), &lambert(0.6, 0.0));
+        // The wall at x = 0 lights both sides.
+        room.surfaces[0] = lambert(0.5, 60.0);
+        let room = sheet(room, 0.6, coverage, alpha);
+        let receivers =
+            point("below", [0.6, 0.2, 0.4], [-1.0, 0.3, 0.1]) + &point("beside", [0.9, 0.7, 0.6], [-1.0, -0.3, 0.0]);
+        let case = |estimator: &str, histories: u32| {
+            let run = format!(
+                "[run]\nhistories_per_batch = {histories}\nbatches = 64\nseed = 65\n[transport]\nestimator = \"{estimator}\"\n"
+            );
+            Case::new(&(run + &receivers), room.clone())
+        };
+        let (local, reverse) = (case("local", 1024), case("reverse", 4096));
         let names = local.job.sets().into_iter().map(|s| s.name);
         let mut all: Vec<_> = names
             .zip(local.values().into_iter().zip(reverse.values()))

@@ -167,6 +167,7 @@ fn textured(base_layer: Layer, data_layer: Option<Layer>, coverage: Coverage) ->
         factors: [0.0, 1.0],
         data_layer,
         dielectric: Dielectric::PLAIN,
+        transmission_layer: None,
         emission: Colour::BLACK,
         emission_layer: None,
         uniform_law: false,

@@ -65,13 +65,14 @@ fn bound_of_closed(scene: &Scene) -> f64 {
     let (mut area, mut reflecting) = (0.0, 0.0);
     for primitive in 0..scene.primitives() {
         let surface = scene.surface(primitive);
-        if surface.is_veil() {
+        if surface.is_veil() && surface.reflectance.is_black() {
             continue;
         }
         let sides = if surface.double_sided { 2.0 } else { 1.0 };
         let side = sides * scene.geometry.area(primitive);
         area += side;
-        reflecting += side * surface.reflectance.albedo(0.5).luminance();
+        // What goes straight on is not absorbed either.
+        reflecting += side * (surface.reflectance.albedo(0.5) + surface.reflectance.straight(0.5)).luminance();
     }
     SCORE_OF_A_HISTORY * PI / (area * (1.0 - (reflecting / area).min(BRIGHTEST)))
 }

@@ -116,7 +116,12 @@ impl Scene {
         let veils: Vec<bool> = (0..).zip(&surface_of).map(is_veil).collect();
         if let Some(veil) = model.replacements.iter().find(|r| surfaces[r.surface as usize].is_veil()) {
             let name = &surfaces[veil.surface as usize].name;
-            return Err(Error::input("scene", "[[replace]]", name, "a material that is no pane: panes are triangles"));
+            return Err(Error::input(
+                "scene",
+                "[[replace]]",
+                name,
+                "a material that lets no light straight through: panes and sheets are triangles",
+            ));
         }
         let harmonics = model.replacements.iter().map(|r| r.harmonic.clone().moved(offset)).collect();
         let geometry = Geometry::veiled(&corners, &veils, build)

@@ -1,8 +1,14 @@
 //! Surfaces that let light through straight on: what is left of it, and where it is met.
 //!
 //! Light that goes straight through a veil stays on its segment: visibility becomes a transmittance, and no vertex, no
-//! reflection and no delta scatterer is counted. What is not let through is *met*: the surface's law of reflection has it, and
-//! its albedo is a share of what is met.
+//! reflection and no delta scatterer is counted. What is not let through is *met*: the surface's law of reflection has it. With c the share
+//! that the surface covers there (alpha; 1 without), s what its law lets straight through at the angle of incidence:
+//!
+//! ```text
+//! through = 1 - c + c s
+//! met     = c          sheets: albedo + s <= 1, the law is a share of all light that the surface has
+//! met     = 1 - through    panes (c = 1) and opaque laws (s = 0): the law is a share of what is met
+//! ```
 
 use super::textures::{Coverage, Place};
 use super::{Delta, Reflectance, Scattered, Scene, Surface};
@@ -27,28 +33,29 @@ pub enum Meeting {
 impl Surface {
     /// True when its law lets light through straight on.
     pub fn is_veil(&self) -> bool {
-        matches!(self.reflectance, Reflectance::Delta(Delta::Pane(_)))
-    }
-
-    /// The share of light that goes straight on through it, `cosine` is that of incidence, above 0.
-    fn transmittance(&self, cosine: f64) -> Colour {
-        match &self.reflectance {
-            Reflectance::Delta(Delta::Pane(pane)) => pane.transmittance(cosine),
-            _ => Colour::BLACK,
-        }
+        self.reflectance.is_veil()
     }
 }
 
 impl Scene {
     /// The share of light that goes straight on through the surface `primitive` \[1\].
     pub fn let_through(&self, primitive: u32, position: DVec3, cosine: f64) -> Colour {
-        let surface = self.surface_of[primitive as usize];
-        match self.textures.of(surface, primitive) {
+        let covered = self.covered(primitive, position);
+        let surface = &self.surfaces[self.surface_of[primitive as usize] as usize];
+        if !surface.is_veil() {
+            return Colour::grey(1.0 - covered);
+        }
+        // The law of the place is made for a veil alone: this is asked at every crossing.
+        Colour::grey(1.0 - covered) + self.reflectance(primitive, position).straight(cosine) * covered
+    }
+
+    /// The share of light that meets the surface `primitive` at all, where alpha is less than one \[1\].
+    fn covered(&self, primitive: u32, position: DVec3) -> f64 {
+        match self.textures.of(self.surface_of[primitive as usize], primitive) {
             Some(textured) if textured.coverage != Coverage::Whole => {
-                let place = Place::new(primitive, self.geometry.triangle(primitive), position);
-                Colour::grey(1.0 - self.textures.covered(textured, place))
+                self.textures.covered(textured, Place::new(primitive, self.geometry.triangle(primitive), position))
             }
-            _ => self.surfaces[surface as usize].transmittance(cosine),
+            _ => 1.0,
         }
     }
 
@@ -155,22 +162,27 @@ impl Scene {
         let cosine = -direction.dot(hit.normal);
         let through = self.let_through(hit.primitive, hit.position, cosine);
         let rest = Colour::WHITE + through * -1.0;
-        // What is met counts as much as it reflects; where connections start from it, all of it.
         let reflectance = self.reflectance(hit.primitive, hit.position);
-        let kept = match (reflectance.is_black(), mirrors) {
-            (false, _) => rest.luminance(),
-            (true, true) => (rest * reflectance.albedo(cosine)).luminance(),
-            (true, false) => 0.0,
+        let met = match reflectance.is_sheet() {
+            true => Colour::grey(self.covered(hit.primitive, hit.position)),
+            false => rest,
+        };
+        // What is met counts as much as it reflects; of an opaque law under a coverage, where connections start from it, all of it.
+        let is_black = reflectance.is_black();
+        let kept = match is_black || reflectance.is_sheet() {
+            true if is_black && !mirrors => 0.0,
+            true => (met * reflectance.albedo(cosine)).luminance(),
+            false => rest.luminance(),
         };
         let passed = through.luminance();
         if passed == 0.0 {
-            return Meeting::Met(rest);
+            return Meeting::Met(met);
         }
         let probability = passed / (passed + kept);
         if kept == 0.0 || rng.chance(probability) {
             Meeting::Through(through / if kept == 0.0 { 1.0 } else { probability })
         } else {
-            Meeting::Met(rest / (1.0 - probability))
+            Meeting::Met(met / (1.0 - probability))
         }
     }
 

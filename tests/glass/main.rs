@@ -6,6 +6,7 @@ mod common;
 mod materials;
 mod opal;
 mod panes;
+mod sheets;
 mod solid;
 
 #[test]

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use crate::{Builder, CORNERS, SQUARE, good, load, refusal, warns};
 use lampyris::math::pow;
 use lampyris::photometry::Colour;
-use lampyris::scene::{Delta, Model, Pane, Reflectance};
+use lampyris::scene::{Delta, Dielectric, Model, Pane, Reflectance};
 
 /// A square of `material`.
 fn square(material: Value) -> Builder {
@@ -211,9 +211,6 @@ fn what_transmits_is_glass() {
     let model = good(&lit);
     assert!(warns(&model, "as it emits") && !model.surfaces[0].is_veil());
 
-    let some = json!({ "KHR_materials_transmission": { "transmissionFactor": 0.5 } });
-    let model = good(&glass(some, 0.0));
-    assert!(warns(&model, "it is opaque") && warns(&model, "[[material]]") && !model.surfaces[0].is_veil());
     let none = json!({ "KHR_materials_transmission": {} });
     assert!(good(&glass(none, 0.0)).warnings.is_empty());
     for (extensions, field) in [
@@ -224,6 +221,80 @@ fn what_transmits_is_glass() {
     }
     thick["KHR_materials_volume"]["attenuationDistance"] = json!(0.0);
     refused(&glass(thick, 0.0), "attenuationDistance");
+}
+
+/// A sheet of base colour (0.9, 0.8, 0.7) that transmits `share`.
+fn sheet(share: f64, metallic: f64, roughness: f64) -> Builder {
+    let factors = json!({ "metallicFactor": metallic, "roughnessFactor": roughness,
+        "baseColorFactor": [0.9, 0.8, 0.7, 1.0] });
+    let extensions = json!({ "KHR_materials_transmission": { "transmissionFactor": share } });
+    square(json!({ "name": "blind", "pbrMetallicRoughness": factors, "extensions": extensions }))
+}
+
+/// Asserts that the surface of `model` reflects and transmits as the metallic-roughness law of base colour (0.9, 0.8, 0.7).
+fn assert_sheet(model: &Model, metallic: f64, roughness: f64, transmission: f64) {
+    let dielectric = Dielectric { transmission, ..Dielectric::PLAIN };
+    let wanted = Reflectance::layered(Colour([0.9, 0.8, 0.7]), metallic, roughness, dielectric);
+    let surface = &model.surfaces[0];
+    assert!(surface.double_sided && surface.is_veil() && surface.reflectance.lambert().is_none());
+    for cosine in [0.1, 0.5, 1.0] {
+        let (found, wanted) = (surface.reflectance.shares(cosine), wanted.shares(cosine));
+        assert_close(found.0, wanted.0.0);
+        assert_close(found.1, wanted.1.0);
+    }
+}
+
+#[test]
+fn what_transmits_in_part_is_a_sheet() {
+    let model = good(&sheet(0.5, 0.0, 0.0));
+    assert_sheet(&model, 0.0, 0.0, 0.5);
+    assert!(model.warnings.is_empty(), "{:?}", model.warnings);
+    // At normal incidence the outer surface reflects 0.04, and half of the rest is tinted and goes on.
+    assert_close(model.surfaces[0].reflectance.straight(1.0), [0.48 * 0.9, 0.48 * 0.8, 0.48 * 0.7]);
+
+    let rough = good(&sheet(0.5, 0.0, 1.0));
+    assert_sheet(&rough, 0.0, 1.0, 0.5);
+    assert!(warns(&rough, "what it transmits goes straight on") && warns(&rough, "kind = \"opal\""));
+    // A metal in part, and one with all that is no metal transmitting.
+    assert_sheet(&good(&sheet(0.5, 0.25, 0.3)), 0.25, 0.3, 0.5);
+    assert_sheet(&good(&sheet(1.0, 0.25, 0.3)), 0.25, 0.3, 1.0);
+
+    let metal = good(&sheet(0.5, 1.0, 0.3));
+    assert!(warns(&metal, "it is opaque: with metallicFactor 1") && metal.warnings.len() == 1);
+    assert!(!metal.surfaces[0].is_veil() && !metal.surfaces[0].double_sided);
+
+    let mut thick = sheet(0.5, 0.0, 0.0);
+    thick.json["materials"][0]["extensions"]["KHR_materials_volume"] = json!({ "thicknessFactor": 0.1 });
+    thick.json["materials"][0]["extensions"]["KHR_materials_ior"] = json!({ "ior": 2.0 });
+    let thick = good(&thick);
+    assert!(warns(&thick, "KHR_materials_volume is ignored"));
+    assert_close(thick.surfaces[0].reflectance.delta_reflectance(1.0).expect("polished"), [1.0 / 9.0; 3]);
+
+    let mut lit = sheet(0.5, 0.0, 1.0);
+    lit.json["materials"][0]["emissiveFactor"] = json!([1.0, 1.0, 1.0]);
+    let lit = good(&lit);
+    assert!(warns(&lit, "as it emits") && lit.warnings.len() == 1);
+    assert_eq!((rho(&lit), lit.surfaces[0].double_sided), (Colour([0.9, 0.8, 0.7]), false));
+    refused(&sheet(-0.5, 0.0, 0.0), "transmissionFactor");
+}
+
+#[test]
+fn a_texture_of_transmission_counts_by_the_mean_of_its_red_where_it_is_not_laid_out() {
+    let image = png(2, png::ColorType::Rgb, png::BitDepth::Eight, &[255, 9, 9, 51, 200, 9]);
+    let textured = |share: f64, image: &[u8]| {
+        let mut builder = sheet(share, 0.0, 0.0);
+        builder.json["materials"][0]["extensions"]["KHR_materials_transmission"]["transmissionTexture"] =
+            json!({ "index": 0 });
+        with_image(builder, image)
+    };
+    let model = good(&textured(1.0, &image));
+    assert_sheet(&model, 0.0, 0.0, 0.6);
+    assert!(warns(&model, "has no TEXCOORD_0: the textures of material `blind` count by their means"));
+    // A texture of nothing, and a factor of nothing, which asks for no texture.
+    let black = png(1, png::ColorType::Rgb, png::BitDepth::Eight, &[0, 255, 255]);
+    assert!(!good(&textured(1.0, &black)).surfaces[0].is_veil());
+    let none = good(&textured(0.0, b"no image"));
+    assert!(!none.surfaces[0].is_veil() && none.warnings.is_empty(), "{:?}", none.warnings);
 }
 
 /// Asserts that `builder` is refused for a field with the word `word`.

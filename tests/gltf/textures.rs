@@ -329,3 +329,60 @@ fn alpha_of_factor_and_vertices_multiply() {
     builder.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = json!(accessor);
     through(&builder).into_iter().for_each(|share| assert!((share - 0.85).abs() < 1e-6, "{share}"));
 }
+
+/// A square of which texture 0 says where it transmits, on white.
+fn sheet(more: Value) -> Builder {
+    let transmission = json!({ "transmissionFactor": 0.5, "transmissionTexture": { "index": 0 } });
+    let mut material = json!({ "name": "blind", "pbrMetallicRoughness": { "metallicFactor": 0.0, "roughnessFactor": 0.0 },
+        "extensions": { "KHR_materials_transmission": transmission } });
+    material["pbrMetallicRoughness"].as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+    // Red is all above left, none above right, 3/5 and 1/5 below; the rest has no say.
+    let image = png(2, &[255, 0, 0, 0, 255, 255, 153, 77, 0, 51, 200, 3]);
+    square(material, &UPRIGHT, json!({ "magFilter": NEAREST }), &image)
+}
+
+fn assert_shares(found: [f64; 4], wanted: [f64; 4]) {
+    for (f, w) in found.into_iter().zip(wanted) {
+        assert!((f - w).abs() < 1e-9, "{found:?} is not {wanted:?}");
+    }
+}
+
+#[test]
+fn red_says_how_much_transmits_and_base_colour_metal_and_alpha_have_their_say() {
+    let clear = sheet(json!({}));
+    assert_shares(through(&clear), [0.48, 0.0, 0.288, 0.096]);
+    let model = good(&clear);
+    assert!(model.warnings.is_empty() && model.surfaces[0].double_sided, "{:?}", model.warnings);
+    // Where nothing transmits it is what it would be without.
+    let opaque = Reflectance::metallic_roughness(Colour::WHITE, 0.0, 0.0);
+    assert_eq!(law(&scene(model), 0.75, 0.75).albedo(0.3), opaque.albedo(0.3));
+
+    // The report is of the means: 0.45 of the texture.
+    let text = lampyris::report::reflectance_text(&scene(good(&clear)));
+    assert!(text.lines().any(|line| line.contains("transmits") && line.contains(" 0.2160 ")), "{text}");
+
+    let tinted = sheet(json!({ "baseColorFactor": [0.5, 1.0, 1.0, 1.0] }));
+    assert_shares(through(&tinted), [0.24, 0.0, 0.144, 0.048]);
+    let metal = sheet(json!({ "metallicFactor": 0.25 }));
+    // F0 = 0.04 x 3/4 + 1/4.
+    assert_shares(through(&metal), [0.5, 0.0, 0.3, 0.1].map(|t| t * 0.75 * 0.72));
+    let mut veiled = sheet(json!({ "baseColorFactor": [1.0, 1.0, 1.0, 0.75] }));
+    veiled.json["materials"][0]["alphaMode"] = json!("BLEND");
+    assert_shares(through(&veiled), [0.48, 0.0, 0.288, 0.096].map(|s| 0.25 + 0.75 * s));
+}
+
+#[test]
+fn metal_by_a_texture_hides_what_transmits() {
+    // Roughness in green, metallic in blue: none above left, all above right, 3/5 and 1/5 below.
+    let mut builder = sheet(json!({ "metallicFactor": 1.0, "metallicRoughnessTexture": { "index": 1 } }));
+    let view = builder.view(&png(2, &[0, 0, 0, 0, 0, 255, 0, 0, 153, 0, 0, 51]));
+    builder.push("/images", json!({ "bufferView": view }));
+    builder.push("/textures", json!({ "source": 1, "sampler": 0 }));
+    let transmission = "/materials/0/extensions/KHR_materials_transmission";
+    builder.remove(transmission, "transmissionTexture");
+    let left = |metallic: f64| 0.5 * (1.0 - metallic) * (1.0 - 0.04 * (1.0 - metallic) - metallic);
+    assert_shares(through(&builder), [left(0.0), 0.0, left(0.6), left(0.2)]);
+    // All that is no metal transmits: still no pane.
+    builder.set(&format!("{transmission}/transmissionFactor"), json!(1.0));
+    assert_shares(through(&builder), [0.0, 1.0, 0.6, 0.2].map(|metallic| 2.0 * left(metallic)));
+}

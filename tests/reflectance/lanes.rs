@@ -1,5 +1,6 @@
 //! The law in lanes of f32 against its twin in f64, and its bits on every path.
 
+use super::sheets::SHEETS;
 use super::{ALPHAS, BASE, DIELECTRICS, METALLIC, MIRROR, generator, law};
 use lampyris::geometry::simd::exact::splat;
 use lampyris::geometry::simd::{Isa, Kernel, Path, Vector};
@@ -81,7 +82,7 @@ fn lanes_of_f32_agree_with_f64() {
         }
     }
     check(&law(Colour::grey(0.5), 0.0, MIRROR), 2e-6);
-    for dielectric in &DIELECTRICS[..3] {
+    for dielectric in DIELECTRICS[..3].iter().chain(&SHEETS) {
         check(&Reflectance::layered(BASE, 0.3, 0.4, *dielectric), 2e-6 + 1e-6 / 0.16);
     }
 }

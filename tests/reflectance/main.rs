@@ -4,6 +4,7 @@ mod lanes;
 mod laws;
 mod quadrature;
 mod sampling;
+mod sheets;
 mod tables;
 
 use lampyris::math::{DVec3, PI};
@@ -68,10 +69,10 @@ fn never_reflects_more_than_it_receives_and_knows_how_much() {
 
 /// The outer surfaces of KHR_materials_ior and KHR_materials_specular: glass of index 2, a coloured one, a weak one, none.
 const DIELECTRICS: [Dielectric; 4] = [
-    Dielectric { f0: Colour::grey(1.0 / 9.0), f90: 1.0 },
-    Dielectric { f0: Colour([0.3, 0.05, 0.0]), f90: 1.0 },
-    Dielectric { f0: Colour::grey(0.02), f90: 0.5 },
-    Dielectric { f0: Colour::BLACK, f90: 0.0 },
+    Dielectric { f0: Colour::grey(1.0 / 9.0), ..Dielectric::PLAIN },
+    Dielectric { f0: Colour([0.3, 0.05, 0.0]), ..Dielectric::PLAIN },
+    Dielectric { f0: Colour::grey(0.02), f90: 0.5, ..Dielectric::PLAIN },
+    Dielectric { f0: Colour::BLACK, f90: 0.0, ..Dielectric::PLAIN },
 ];
 
 #[test]

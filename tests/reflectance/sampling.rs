@@ -3,6 +3,7 @@
 //! Each of the [`COMPARISONS`] statistical statements fails by chance with probability 1e-6 / COMPARISONS.
 
 use crate::quadrature::Incidence;
+use crate::sheets::SHEETS;
 use crate::{BASE, DIELECTRICS, MIRROR, generator, integrated_albedo, largest_difference, law};
 use lampyris::math::DVec3;
 use lampyris::photometry::Colour;
@@ -106,7 +107,7 @@ fn directions_follow_their_density() {
 
 #[test]
 fn directions_follow_their_density_under_other_outer_surfaces() {
-    for (i, dielectric) in DIELECTRICS[..3].iter().enumerate() {
+    for (i, dielectric) in DIELECTRICS[..3].iter().chain(&SHEETS).enumerate() {
         for (metallic, alpha, mu) in [(0.0, 0.1, 0.3), (0.4, 0.25, 0.7)] {
             let law = Reflectance::layered(BASE, metallic, f64::sqrt(alpha), *dielectric);
             let at = Incidence::new(NORMAL, mu, alpha);

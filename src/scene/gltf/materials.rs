@@ -5,7 +5,7 @@
 use std::collections::HashMap;
 
 use super::document::{Document, Material, Primitive, Specular, TextureReference};
-use super::glass::glass;
+use super::glass::{self, glass};
 use super::images::Images;
 use super::problem::{File, Warnings};
 use crate::error::Result;
@@ -40,6 +40,11 @@ struct Reading<'m> {
 struct Slot {
     mean: [f64; 4],
     layer: Option<Layer>,
+}
+
+impl Slot {
+    /// Nothing of it.
+    const NONE: Slot = Slot { mean: [0.0; 4], layer: None };
 }
 
 impl<'a> Materials<'a> {
@@ -110,17 +115,24 @@ impl<'a> Materials<'a> {
         let data = self.slot(&factors.metallic_roughness_texture, &data_at, Coding::Data, &reading)?;
         let emission = self.emission(material, path)?;
         let glow = self.slot(&material.emissive_texture, &format!("{path}.emissiveTexture"), Coding::Srgb, &reading)?;
-        let dielectric = self.dielectric(material, path, name, warnings)?;
+        let outer = self.dielectric(material, path, name, warnings)?;
         let colour = Colour([r, g, b]);
         let [_, green, blue, _] = data.mean;
+        let share = glass::factor(self.file, material, path)?;
         let glass = glass(self.file, material, (path, name), colour * rgb(base.mean), warnings)?;
         let emits = !(emission * rgb(glow.mean)).is_black();
-        if emits && glass.is_some() {
+        if emits && share > 0.0 {
             warnings.add(format!("material `{name}`: it is opaque, as it emits: glass does not"));
         }
         let glass = glass.filter(|_| !emits);
         let is_glass = glass.is_some();
+        let sheet = match is_glass || emits {
+            true => Slot::NONE,
+            false => self.sheet(&reading, share, metallic * blue, warnings)?,
+        };
+        let [mean, ..] = sheet.mean;
         let reflectance = glass.unwrap_or_else(|| {
+            let dielectric = Dielectric { transmission: mean, ..outer };
             Reflectance::layered(colour * rgb(base.mean), metallic * blue, roughness * green, dielectric)
         });
         if data.layer.is_some() {
@@ -129,13 +141,13 @@ impl<'a> Materials<'a> {
         let surface = Surface {
             name: name.clone(),
             reflectance,
-            // Glass has no back.
-            double_sided: material.double_sided || is_glass,
+            // Glass and sheets have no back.
+            double_sided: material.double_sided || is_glass || mean > 0.0,
             emission: emission * rgb(glow.mean),
         };
         let coverage = self.coverage(&reading, alpha, &base, warnings)?;
         let is_laid = base.layer.is_some();
-        let laid = [&base, &data, &glow].iter().any(|slot| slot.layer.is_some());
+        let laid = [&base, &data, &sheet, &glow].iter().any(|slot| slot.layer.is_some());
         let varies = !is_glass && (*coloured || laid || coverage != Coverage::Whole);
         let textured = Textured {
             sets: if *mapped { sets(material).len() } else { 0 },
@@ -145,7 +157,8 @@ impl<'a> Materials<'a> {
             base_layer: base.layer,
             factors: if data.layer.is_some() { [metallic, roughness] } else { [metallic * blue, roughness * green] },
             data_layer: data.layer,
-            dielectric,
+            dielectric: Dielectric { transmission: if sheet.layer.is_some() { share } else { mean }, ..outer },
+            transmission_layer: sheet.layer,
             emission,
             emission_layer: glow.layer,
             uniform_law: false,
@@ -173,6 +186,16 @@ impl<'a> Materials<'a> {
         let place = sets(reading.material).iter().position(|&set| set == layer.set);
         layer.set = place.expect("it is among the coordinates of its material");
         Ok(Slot { mean, layer: Some(layer) })
+    }
+
+    /// The share of the dielectric part that transmits, where that is no clear glass: `factor` by the mean of its texture, and the
+    /// texture. `metallic` is the mean share of metal.
+    fn sheet(&mut self, reading: &Reading, factor: f64, metallic: f64, warnings: &mut Warnings) -> Result<Slot> {
+        let field = format!("{}.{}.transmissionTexture", reading.path, glass::EXTENSION);
+        let slot = self.slot(glass::texture(reading.material), &field, Coding::Data, reading)?;
+        let [red, ..] = slot.mean;
+        let share = glass::share_of_sheet(reading.material, &reading.name, factor * red, metallic, warnings);
+        Ok(Slot { mean: [share; 4], layer: slot.layer.filter(|_| share > 0.0) })
     }
 
     /// What the `alpha` of the base colour and of its texture `base` means.
@@ -243,7 +266,7 @@ impl<'a> Materials<'a> {
             warnings.add(format!("material `{name}`: specularColorTexture counts by its mean"));
         }
         let f0 = (dielectric.f0 * colour).map(|f0| f0.min(1.0) * strength);
-        Ok(Dielectric { f0, f90: strength })
+        Ok(Dielectric { f0, f90: strength, ..dielectric })
     }
 }
 
@@ -259,7 +282,12 @@ pub fn texcoord(set: usize) -> String {
 /// Numbers of the coordinates that the textures of `material` use, each once.
 fn sets(material: &Material) -> Vec<usize> {
     let factors = &material.pbr_metallic_roughness;
-    let all = [&factors.base_color_texture, &factors.metallic_roughness_texture, &material.emissive_texture];
+    let all = [
+        &factors.base_color_texture,
+        &factors.metallic_roughness_texture,
+        glass::texture(material),
+        &material.emissive_texture,
+    ];
     let mut sets = Vec::new();
     for reference in all.into_iter().flatten() {
         let transform = reference.extensions.transform.as_ref();

@@ -1,12 +1,16 @@
 //! Metallic-roughness law: a specular part over a diffuse part that only receives what the first lets through.
 //!
 //! ```text
-//! f     = F(h) D V  +  (1 - metallic) rho/pi (1 - a(mu)) (1 - a(mu')) / (1 - <a>)             [1/sr], per channel
-//! F     = F0 + (F90 - F0) (1 - (v,h))^5,   F0 = D0 (1 - metallic) + rho metallic,   F90 = D90 (1 - metallic) + metallic
-//! total = a(mu) + (1 - metallic) rho (1 - a(mu))  <=  1                                        directional albedo
+//! f        = F(h) D V  +  (1 - metallic) (1 - t) rho/pi (1 - a(mu)) (1 - a(mu')) / (1 - <a>)   [1/sr], per channel
+//! F        = F0 + (F90 - F0) (1 - (v,h))^5,   F0 = D0 (1 - metallic) + rho metallic,   F90 = D90 (1 - metallic) + metallic
+//! albedo   = a(mu) + (1 - metallic) (1 - t) rho (1 - a(mu))                                   directional
+//! straight = (1 - metallic) t rho (1 - a(mu))                                                 goes on unscattered
+//! albedo + straight = a(mu) + (1 - metallic) rho (1 - a(mu))  <=  1
 //! ```
 //!
-//! D0 and D90 are those of the dielectric, 0.04 and 1 where the file says nothing. D V is in `microfacet`, the specular
+//! D0, D90 and t, the share of what is under the outer surface that transmits, are those of the dielectric: 0.04, 1 and 0 where the
+//! file says nothing. What is straight is no part of f: a surface with t > 0 is a veil (`scene::veils`), a thin sheet that is the same from
+//! both sides; `straight` depends on mu alone, so that it is reciprocal as well. D V is in `microfacet`, the specular
 //! albedo a and its mean `<a>` in `albedo`. The mix that the glTF specification
 //! suggests, a diffuse part dimmed by F(h) alone, reflects up to 1.3 times the light received at grazing incidence;
 //! it is replaced by this one, which is reciprocal and conserves energy. Light reflected between facets more than
@@ -22,18 +26,20 @@ use crate::math::{DVec3, PI, frame, to_world};
 use crate::photometry::Colour;
 use crate::random::{Generator, around_z, cosine_hemisphere};
 
-/// What lies over the diffuse part where there is no metal.
+/// What a material is where there is no metal: its outer surface, and whether it transmits what gets through that.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dielectric {
     /// Specular reflectance at normal incidence.
     pub f0: Colour,
     /// Specular reflectance at grazing incidence, the same in all channels and in none below `f0`.
     pub f90: f64,
+    /// Share of what is under the outer surface that lets light straight through, tinted by the base colour; the rest is matt.
+    pub transmission: f64,
 }
 
 impl Dielectric {
-    /// glTF's own: refractive index 1.5.
-    pub const PLAIN: Dielectric = Dielectric { f0: Colour::grey(0.04), f90: 1.0 };
+    /// glTF's own: refractive index 1.5, opaque.
+    pub const PLAIN: Dielectric = Dielectric { f0: Colour::grey(0.04), f90: 1.0, transmission: 0.0 };
 }
 
 /// A metallic-roughness material.
@@ -46,8 +52,10 @@ pub struct Glossy {
     f0: Colour,
     /// Specular reflectance at grazing incidence.
     f90: f64,
-    /// Reflectance of the layer under the specular one, (1 - metallic) rho.
+    /// Reflectance of the layer under the specular one, (1 - metallic) (1 - t) rho.
     under: Colour,
+    /// Transmittance of the layer under the specular one, (1 - metallic) t rho.
+    clear: Colour,
     /// `under` / (pi (1 - <a>)).
     diffuse: Colour,
     finish: Finish,
@@ -60,7 +68,9 @@ impl Glossy {
     pub(super) fn new(base: Colour, metallic: f64, dielectric: Dielectric, finish: Finish) -> Self {
         let f0 = zip(base, dielectric.f0, |rho, d0| d0 * (1.0 - metallic) + rho * metallic);
         let f90 = 1.0 - (1.0 - dielectric.f90) * (1.0 - metallic);
-        let under = base * (1.0 - metallic);
+        let dielectric_part = base * (1.0 - metallic);
+        let under = dielectric_part * (1.0 - dielectric.transmission);
+        let clear = dielectric_part * dielectric.transmission;
         let mean = finish.0.mean;
         // What lets less than this through is a metal as white as can be, with as little under it: 0/0 means zero.
         let diffuse = zip(under, f0, |u, f0| match 1.0 - mean.albedo(f0, f90) {
@@ -68,7 +78,8 @@ impl Glossy {
             _ => 0.0,
         });
         let lanes = LawInLanes::new((f0, f90), diffuse, finish.0.lanes.clone());
-        let mut law = Glossy { base, metallic, dielectric, f0, f90, under, diffuse, finish, lanes, peaked: false };
+        let mut law =
+            Glossy { base, metallic, dielectric, f0, f90, under, clear, diffuse, finish, lanes, peaked: false };
         law.peaked = law.is_peaked_at(super::PEAKED_COSINE);
         law
     }
@@ -76,6 +87,12 @@ impl Glossy {
     /// The same material with another base colour.
     pub(super) fn with_base(&self, base: Colour) -> Self {
         Self::new(base, self.metallic, self.dielectric, self.finish.clone())
+    }
+
+    /// The same material of which another share transmits.
+    pub(super) fn with_transmission(&self, transmission: f64) -> Self {
+        let dielectric = Dielectric { transmission, ..self.dielectric };
+        Self::new(self.base, self.metallic, dielectric, self.finish.clone())
     }
 
     /// The same material in one photometric channel.
@@ -195,6 +212,17 @@ impl Glossy {
         self.f0.map(|f0| specular.albedo(f0, self.f90)) + self.diffuse_albedo(specular)
     }
 
+    /// The share of light that goes straight on at the cosine `mu` of incidence.
+    pub(super) fn straight(&self, mu: f64) -> Colour {
+        let specular = self.specular(mu);
+        zip(self.clear, self.f0, |clear, f0| clear * (1.0 - specular.albedo(f0, self.f90)))
+    }
+
+    /// True when some light goes straight on.
+    pub(super) fn transmits(&self) -> bool {
+        !self.clear.is_black()
+    }
+
     /// Reflectance of the delta component at the cosine `mu` of incidence.
     pub(super) fn delta_reflectance(&self, mu: f64) -> Option<Colour> {
         self.has_delta().then(|| self.fresnel(mu))
@@ -224,7 +252,8 @@ impl Glossy {
 
     /// True when f without the delta component is zero.
     pub(super) fn is_black(&self) -> bool {
-        self.has_delta() && self.diffuse.is_black()
+        // A sheet that transmits all may have an outer surface that reflects nothing.
+        (self.has_delta() || self.f90 == 0.0) && self.diffuse.is_black()
     }
 }
 

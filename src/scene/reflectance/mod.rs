@@ -87,7 +87,7 @@ impl Reflectance {
         Self::layered(base, metallic, roughness, Dielectric::PLAIN)
     }
 
-    /// The same over another dielectric; one that reflects nothing is Lambert whatever its roughness.
+    /// The same over another dielectric; one that reflects nothing is Lambert whatever its roughness, and one that transmits never is.
     ///
     /// # Panics
     /// As [`Reflectance::metallic_roughness`], and where `dielectric` is not in 0 ..= 1 or has an `f0` above its `f90`.
@@ -95,9 +95,12 @@ impl Reflectance {
         let allowed = |x: f64| (0.0..=1.0).contains(&x);
         assert!(base.0.into_iter().all(allowed), "base colour outside 0 ..= 1: {base:?}");
         assert!(allowed(metallic) && allowed(roughness), "metallic or roughness outside 0 ..= 1");
-        let Dielectric { f0, f90 } = dielectric;
-        assert!(allowed(f90) && f0.0.into_iter().all(|f0| f0 >= 0.0 && f0 <= f90), "{dielectric:?}");
-        if metallic == 0.0 && (roughness == 1.0 || f90 == 0.0) {
+        let Dielectric { f0, f90, transmission } = dielectric;
+        assert!(
+            allowed(transmission) && allowed(f90) && f0.0.into_iter().all(|f0| f0 >= 0.0 && f0 <= f90),
+            "{dielectric:?}"
+        );
+        if metallic == 0.0 && transmission == 0.0 && (roughness == 1.0 || f90 == 0.0) {
             Reflectance::Lambert(base)
         } else {
             Self::finished(base, metallic, dielectric, &Finish::new(roughness))
@@ -114,6 +117,14 @@ impl Reflectance {
         match self {
             Reflectance::Lambert(_) => Reflectance::Lambert(base),
             Reflectance::Glossy(law) => Reflectance::Glossy(Box::new(law.with_base(base))),
+            other => other.clone(),
+        }
+    }
+
+    /// The law of the same material of which another share transmits; only glossy ones can.
+    pub fn with_transmission(&self, transmission: f64) -> Self {
+        match self {
+            Reflectance::Glossy(law) => Reflectance::Glossy(Box::new(law.with_transmission(transmission))),
             other => other.clone(),
         }
     }
@@ -224,7 +235,27 @@ impl Reflectance {
                 let mirrored = Colour::grey(glass.reflectance(cosine));
                 (mirrored, Colour::WHITE + mirrored * -1.0)
             }
-            _ => (self.albedo(cosine), Colour::BLACK),
+            _ => (self.albedo(cosine), self.straight(cosine)),
+        }
+    }
+
+    /// True when it lets light through straight on.
+    pub fn is_veil(&self) -> bool {
+        matches!(self, Reflectance::Delta(Delta::Pane(_))) || self.is_sheet()
+    }
+
+    /// True of a veil whose `evaluate` and `sample` are shares of all light that arrives; of other veils they are shares of what does not
+    /// go straight on.
+    pub fn is_sheet(&self) -> bool {
+        matches!(self, Reflectance::Glossy(law) if law.transmits())
+    }
+
+    /// The share of light that goes straight on through a veil at the cosine of incidence, above 0.
+    pub fn straight(&self, cosine: f64) -> Colour {
+        match self {
+            Reflectance::Delta(Delta::Pane(pane)) => pane.transmittance(cosine),
+            Reflectance::Glossy(law) => law.straight(cosine),
+            _ => Colour::BLACK,
         }
     }
 

@@ -3,6 +3,7 @@
 //! ```text
 //! rho       = factor x texture (linear) x colour of the vertices, blended over the triangle
 //! metallic  = factor x blue,    roughness = factor x green, rounded to the nearest 1/255
+//! t         = factor x red of a texture of its own
 //! L         = factor x strength x texture (linear)
 //! ```
 //!
@@ -54,8 +55,10 @@ pub struct Textured {
     pub factors: [f64; 2],
     /// What multiplies them: roughness is its green, metallic its blue.
     pub data_layer: Option<Layer>,
-    /// What the outer surface is where there is no metal.
+    /// What it is where there is no metal, its transmission without texture.
     pub dielectric: Dielectric,
+    /// What multiplies the transmission, by its red.
+    pub transmission_layer: Option<Layer>,
     /// Emitted luminance without texture \[cd/m2\].
     pub emission: Colour,
     /// What multiplies it.
@@ -156,16 +159,28 @@ impl Textures {
             return uniform.clone();
         }
         let base = self.painted(self.base(textured, place));
-        let Some(layer) = &textured.data_layer else { return uniform.with_base(base) };
+        let transmission = textured.transmission_layer.as_ref().map(|layer| {
+            let [red, ..] = self.read(textured, layer, place);
+            (textured.dielectric.transmission * red).clamp(0.0, 1.0)
+        });
+        let Some(layer) = &textured.data_layer else {
+            let law = uniform.with_base(base);
+            return match transmission {
+                Some(share) => law.with_transmission(share),
+                None => law,
+            };
+        };
         let [_, green, blue, _] = self.read(textured, layer, place);
         let [metallic, roughness] = textured.factors;
         let (metallic, step) = ((metallic * blue).clamp(0.0, 1.0), step_of(roughness * green));
-        let Dielectric { f0, f90 } = textured.dielectric;
-        if metallic == 0.0 && (step == STEPS as usize || f90 == 0.0) {
+        let Dielectric { f0, f90, transmission: most } = textured.dielectric;
+        // Where a material may transmit it has its outer surface everywhere: a texture of it draws no edges of another finish.
+        if metallic == 0.0 && most == 0.0 && (step == STEPS as usize || f90 == 0.0) {
             return Reflectance::Lambert(base);
         }
         let finish = self.finishes[step].as_ref().expect("every step between the least and the greatest was made");
-        Reflectance::finished(base, metallic, Dielectric { f0: self.painted(f0), f90 }, finish)
+        let dielectric = Dielectric { f0: self.painted(f0), f90, transmission: transmission.unwrap_or(most) };
+        Reflectance::finished(base, metallic, dielectric, finish)
     }
 
     /// True where the emission of `triangle` on `surface` varies.
@@ -236,12 +251,13 @@ impl Textures {
         let varying = self.of_surface.iter().enumerate().filter_map(|(i, textured)| Some((i, textured.as_ref()?)));
         let varying = varying.filter(|(_, textured)| !textured.uniform_law);
         varying.map(move |(i, textured)| {
+            let opaque = Dielectric { transmission: 0.0, ..textured.dielectric };
             let finest = textured
                 .data_layer
                 .as_ref()
                 .and_then(|layer| self.finishes[step_of(textured.factors[1] * layer.image.range(1).0)].as_ref());
             match finest {
-                Some(finish) => Reflectance::finished(Colour::WHITE, textured.factors[0], textured.dielectric, finish),
+                Some(finish) => Reflectance::finished(Colour::WHITE, textured.factors[0], opaque, finish),
                 None => uniform(i).with_base(Colour::WHITE),
             }
         })
@@ -251,7 +267,8 @@ impl Textures {
     pub fn bytes(&self) -> u64 {
         let mut images: Vec<&std::sync::Arc<Image>> = Vec::new();
         for textured in self.of_surface.iter().flatten() {
-            let layers = [&textured.base_layer, &textured.data_layer, &textured.emission_layer];
+            let layers =
+                [&textured.base_layer, &textured.data_layer, &textured.transmission_layer, &textured.emission_layer];
             for layer in layers.into_iter().flatten() {
                 if !images.iter().any(|known| std::sync::Arc::ptr_eq(known, &layer.image)) {
                     images.push(&layer.image);
