@@ -21,6 +21,8 @@ pub(super) const CORNERS: u32 = 64;
 const DIVISIONS: u32 = 3;
 /// Share of its area below which a flat opening is seen edge-on, and dark.
 const EDGE_ON: f64 = 1e-9;
+/// The least share of its area that a face counts in the choice of one, where it is not dark: another part of it may be seen less aslant.
+const LEAST_SHOWN: f64 = 0.1;
 
 /// A triangle, counter-clockwise seen from outside \[m\].
 pub(super) type Triangle = [DVec3; 3];
@@ -109,15 +111,39 @@ impl Panel {
         face.area * if self.flat { cosine.abs() } else { cosine.max(0.0) }
     }
 
-    /// The face that `u` in [0, 1] chooses in proportion to area.
-    pub fn choose_face(&self, u: f64) -> &Emitter {
-        let mut left = u * self.area;
-        let reached = |face: &&Emitter| {
-            left -= face.area;
-            left < 0.0
+    /// The face that `u` in [0, 1] chooses for a point at `from`, and the probability of that; `None` where all are dark there.
+    pub fn choose_face(&self, from: DVec3, u: f64) -> Option<(&Emitter, f64)> {
+        let all: f64 = self.weights(from).sum();
+        let mut left = u * all;
+        let reached = |(_, weight): &(&Emitter, f64)| {
+            left -= weight;
+            *weight > 0.0 && left < 0.0
         };
+        let chosen = self.faces.iter().zip(self.weights(from)).find(reached);
         // Rounding may leave a rest behind the last face.
-        self.faces.iter().find(reached).unwrap_or(&self.faces[self.faces.len() - 1])
+        let last = || self.faces.iter().zip(self.weights(from)).rfind(|(_, weight)| *weight > 0.0);
+        chosen.or_else(last).map(|(face, weight)| (face, weight / all))
+    }
+
+    /// The probability with which `face` is chosen for a point at `from`.
+    pub fn probability(&self, face: &Emitter, from: DVec3) -> f64 {
+        self.weight(face, from) / self.weights(from).sum::<f64>()
+    }
+
+    fn weights(&self, from: DVec3) -> impl DoubleEndedIterator<Item = f64> + ExactSizeIterator {
+        self.faces.iter().map(move |face| self.weight(face, from))
+    }
+
+    /// What a face counts for a point at `from`: about the area that it shows, and some of it wherever it shines there.
+    fn weight(&self, face: &Emitter, from: DVec3) -> f64 {
+        let way = from - face.corners[0];
+        let height = face.normal.dot(way);
+        match self.flat {
+            // All of its faces show the same share.
+            true => face.area,
+            false if height > 0.0 => face.area * (height / way.length()).max(LEAST_SHOWN),
+            false => 0.0,
+        }
     }
 
     /// Where a history starts, and its direction.

@@ -83,13 +83,13 @@ pub fn from_emitters(scene: &Scene, receiver: &Receiver, samples: u64, rng: &mut
 pub fn from_panels(scene: &Scene, receiver: &Receiver, samples: u64, rng: &mut Generator) -> Colour {
     let draw = |from: DVec3, chosen: &Chosen, random: DVec2, rng: &mut Generator| {
         let panel = &scene.sources.panels[chosen.number];
-        let face = panel.choose_face(chosen.within);
-        let sight = Sight::new(face, chosen.probability * face.area / panel.area, from);
+        let face = panel.choose_face(from, chosen.within);
+        let sight = face.and_then(|(face, probability)| Sight::new(face, chosen.probability * probability, from));
         sight.map_or(Colour::BLACK, |sight| sample_emitter(scene, receiver, &sight.of(panel), random, rng))
     };
     let seen = |from: DVec3, hit: &Hit, w_in: DVec3| {
         let (number, panel, face) = scene.sources.panel_face(hit.primitive)?;
-        let sight = Sight::new(face, face.area / panel.area, from)?;
+        let sight = Sight::new(face, panel.probability(face, from), from)?;
         Some((number, sight.of(panel).of_hit(hit, w_in)))
     };
     sampled(scene, receiver, scene.sources.panel_tree(), (samples, rng), draw, seen)
