@@ -128,7 +128,8 @@ fn far_off_a_mesh_lights_as_a_point_in_its_middle() {
 fn of_faces(scene: &Scene, receiver: &Receiver) -> f64 {
     const PIECES: u32 = 32;
     let panel = &scene.sources.panels[0];
-    let places = (0..PIECES * PIECES).map(|k| [k / PIECES, k % PIECES].map(|i| (f64::from(i) + 0.5) / f64::from(PIECES)));
+    let places =
+        (0..PIECES * PIECES).map(|k| [k / PIECES, k % PIECES].map(|i| (f64::from(i) + 0.5) / f64::from(PIECES)));
     let places: Vec<_> = places.map(lampyris::math::DVec2::from).collect();
     let of = |face: &lampyris::scene::Emitter, place| {
         let way = receiver.position - face.point(place);

@@ -159,7 +159,9 @@ fn exact_roots_are_where_steps_lead() {
                 let slope = star.height(o + at * d, d).along.first.abs();
                 assert!((at - crossing.distance).abs() * slope < 1e-12, "{at} {}", crossing.distance);
                 let on = 1e-11 + 1e-12 / slope;
-                assert!(star.is_crossed(o, d, crossing.distance + on) && !star.is_crossed(o, d, crossing.distance - on));
+                assert!(
+                    star.is_crossed(o, d, crossing.distance + on) && !star.is_crossed(o, d, crossing.distance - on)
+                );
                 met += 1;
             }
             (None, None) => {
