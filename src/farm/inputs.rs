@@ -47,7 +47,7 @@ pub fn prepare(path: &Path) -> Result<Prepared> {
     let inputs = files.iter().map(|(input, _): &(Input, Vec<u8>)| input.clone()).collect();
     let mut summary = summary(&scene);
     summary.warnings.extend(lengths::warnings(&job, &scene));
-    summary.warnings.extend(flush::warning(&scene));
+    summary.warnings.extend(flush::warnings(&scene));
     summary.warnings.extend(ReceiverSet::check(&job, &scene, &file)?);
     Regions::check(&job, &scene, &file)?;
     let plan = Plan::new(&name, job, job_file.clone(), inputs, summary)?;

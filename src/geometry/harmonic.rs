@@ -233,7 +233,8 @@ impl Star {
             }
             at = next;
         }
-        None
+        // Lost in rounding, as no line is known to be: better blocked than leaking.
+        Some(Met::Root(at.min(end)))
     }
 
     /// The way within which F, or -F, crosses 0 from a place `x` on a line: where it certainly does, once, without having turned.

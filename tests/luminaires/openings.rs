@@ -262,10 +262,12 @@ fn an_opening_in_the_plane_of_a_surface_is_mentioned() {
     let ceiling = [[-3.0, 2.5, -2.0], [3.0, 2.5, -2.0], [0.0, 2.5, 4.0]];
     let mesh = builder.mesh(&ceiling, None);
     builder.node(json!({ "name": "ceiling", "mesh": mesh }));
-    let mentioned = |file: &str, more: &str| {
+    let [flush, cut] = ["lies in the plane of a surface", "is cut by a surface"];
+    let mentioned = |file: &str, more: &str, what: &str| {
         let job = format!("scene = \"s.glb\"\n{}", luminaire(file, more));
         let plan = planned(&job, &[("s.glb", builder.glb())]).unwrap_or_else(|e| panic!("{e}")).1;
-        plan.scene.warnings.iter().any(|w| w.contains("at [0.300, 2.500, -0.200] lies in the plane of a surface"))
+        let said = |w: &String| w.contains("at [0.300, 2.") && w.contains(what);
+        plan.scene.warnings.iter().any(said)
     };
     for (file, more, expected) in [
         ("opening_rectangle.ies", "position = [0.3, 2.5, -0.2]", true),
@@ -275,9 +277,15 @@ fn an_opening_in_the_plane_of_a_surface_is_mentioned() {
         // Through the ceiling, not in its plane; and what has no opening, or sides.
         ("opening_disc_upright.ies", "position = [0.3, 2.5, -0.2]", false),
         ("opening_disc.ies", "position = [0.3, 2.5, -0.2]\nextent = \"point\"", false),
-        ("opening_box.ies", "position = [0.3, 2.5, -0.2]", false),
     ] {
-        assert_eq!(mentioned(file, more), expected, "{file} {more}");
+        assert_eq!(mentioned(file, more, flush), expected, "{file} {more}");
+        assert!(!mentioned(file, more, cut), "{file} {more}");
+    }
+    for file in ["opening_box.ies", "opening_sphere.ies", "opening_cylinder_upright.ies"] {
+        for (y, expected) in [(2.5, [false, true]), (2.2, [false; 2]), (2.9, [false; 2])] {
+            let more = format!("position = [0.3, {y:.3}, -0.2]");
+            assert_eq!([flush, cut].map(|what| mentioned(file, &more, what)), expected, "{file} {more}");
+        }
     }
 }
 

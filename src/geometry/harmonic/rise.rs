@@ -84,7 +84,7 @@ impl Rise {
         let size = bend.abs() + (bend * bend + 4.0 * third * slope).sqrt();
         let share = if bend < 0.0 { 2.0 * slope / size } else { 0.5 * size / third };
         let share = share.min(reach / length).min(1.0) * MARGIN;
-        (share * slope <= above).then_some(share)
+        if share * slope > above { None } else { Some(share) }
     }
 }
 

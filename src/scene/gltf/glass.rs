@@ -24,10 +24,18 @@ pub(super) fn factor(file: File, material: &Material, path: &str) -> Result<f64>
     file.between(field, transmission.transmission_factor, 0.0, 1.0)
 }
 
-/// The texture that multiplies the transmissionFactor of `material`, where that is not 0.
+/// The texture that multiplies the transmissionFactor of `material`, where anything of it can transmit.
 pub(super) fn texture(material: &Material) -> &Option<TextureReference> {
+    let strength = material.extensions.emissive_strength.as_ref().map_or(1.0, |e| e.emissive_strength);
+    let emits = strength != 0.0 && material.emissive_factor != [0.0; 3];
     match &material.extensions.transmission {
-        Some(transmission) if transmission.transmission_factor > 0.0 => &transmission.transmission_texture,
+        Some(transmission)
+            if transmission.transmission_factor > 0.0
+                && material.pbr_metallic_roughness.metallic_factor < 1.0
+                && !emits =>
+        {
+            &transmission.transmission_texture
+        }
         _ => &None,
     }
 }
