@@ -19,12 +19,10 @@ const CUT: &str = "is cut by a surface: what shines behind that is lost; a box, 
 
 /// What is said of the openings of `scene` that lie in a surface, and of those that are cut by one.
 pub(super) fn warnings(scene: &Scene) -> Vec<String> {
-    let faults: [(&str, fn(&Scene, &Panel) -> bool); 2] = [(FLUSH, is_flush), (CUT, is_cut)];
-    let said = |(what, is): (&str, fn(&Scene, &Panel) -> bool)| {
-        let panels: Vec<&Panel> = scene.sources.panels.iter().filter(|panel| is(scene, panel)).collect();
-        sentence(scene, &panels, what)
-    };
-    faults.into_iter().filter_map(said).collect()
+    let all = &scene.sources.panels;
+    let flush: Vec<&Panel> = all.iter().filter(|panel| is_flush(scene, panel)).collect();
+    let cut: Vec<&Panel> = all.iter().filter(|panel| is_cut(scene, panel)).collect();
+    [(flush, FLUSH), (cut, CUT)].iter().filter_map(|(panels, what)| sentence(scene, panels, what)).collect()
 }
 
 fn sentence(scene: &Scene, panels: &[&Panel], what: &str) -> Option<String> {
