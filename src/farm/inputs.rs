@@ -1,8 +1,8 @@
 //! Files -> plan and scene: a job file beside its inputs becomes a plan with every input known by content, and a
 //! planned folder becomes the scene again, from the copies it keeps.
 
-mod flush;
 mod lengths;
+mod openings;
 
 use super::degree;
 use super::folder::Folder;
@@ -47,7 +47,7 @@ pub fn prepare(path: &Path) -> Result<Prepared> {
     let inputs = files.iter().map(|(input, _): &(Input, Vec<u8>)| input.clone()).collect();
     let mut summary = summary(&scene);
     summary.warnings.extend(lengths::warnings(&job, &scene));
-    summary.warnings.extend(flush::warnings(&scene));
+    summary.warnings.extend(openings::warnings(&scene));
     summary.warnings.extend(ReceiverSet::check(&job, &scene, &file)?);
     Regions::check(&job, &scene, &file)?;
     let plan = Plan::new(&name, job, job_file.clone(), inputs, summary)?;

@@ -96,7 +96,7 @@ enum Met<R> {
     Settled(R),
     /// A crossing, to rounding.
     Reached(f64, Height),
-    /// One found as a root.
+    /// One of which only the distance is known.
     Root(f64),
 }
 

@@ -1,12 +1,11 @@
 //! Panes: the straight segment is dimmed by the transmittance, exactly where there is nothing to sample.
 
+use crate::assert_same_bits_on_every_path;
 use crate::common::scenes::{add_quad, closed_box, lambert, omni, point, spot_camera};
 use crate::common::{Case, Estimate, assert_all, compare, difference, flux};
-use lampyris::geometry::simd::Path;
 use lampyris::math::{DVec3, cos, sin};
 use lampyris::photometry::Colour;
 use lampyris::scene::{Delta, Model, Pane, Reflectance, Surface};
-use lampyris::validate::Experiment;
 use lampyris::validate::scenes::{UP, in_parallel_light, points};
 
 /// A surface of clear or tinted glass.
@@ -158,15 +157,5 @@ fn a_pane_of_index_one_changes_nothing() {
 
 #[test]
 fn every_path_gives_the_same_bits() {
-    let scores = |path: Path| {
-        let mut case = Experiment::new(&parted_room("local", 64), parted(window())).unwrap();
-        case.scene.geometry = std::mem::take(&mut case.scene.geometry).with_path(path);
-        let (_, batches) = case.batches(1..u32::MAX);
-        let bits = batches.iter().flat_map(|b| b.sets.iter().flat_map(|s| s.value.iter().map(|v| v.to_bits())));
-        bits.collect::<Vec<_>>()
-    };
-    let plain = scores(Path::Scalar);
-    for path in Path::ALL.into_iter().filter(|p| p.is_available()) {
-        assert_eq!(scores(path), plain, "{path:?}");
-    }
+    assert_same_bits_on_every_path(&parted_room("local", 64), &parted(window()));
 }

@@ -1,12 +1,11 @@
 //! Sheets that transmit in part: light straight through them against closed forms, and between estimators.
 
+use crate::assert_same_bits_on_every_path;
 use crate::common::scenes::{add_quad, closed_box, lambert, omni, point, spot_camera};
 use crate::common::{Case, Estimate, assert_all, compare, difference, flux};
-use lampyris::geometry::simd::Path;
 use lampyris::math::{DVec3, PI};
 use lampyris::photometry::Colour;
 use lampyris::scene::{Dielectric, Model, Reflectance, Surface};
-use lampyris::validate::Experiment;
 use lampyris::validate::scenes::UP;
 
 /// A sheet of `base` of which the share `t` transmits.
@@ -205,15 +204,5 @@ fn a_sheet_that_neither_reflects_nor_absorbs_changes_nothing() {
 
 #[test]
 fn every_path_gives_the_same_bits() {
-    let scores = |path: Path| {
-        let mut case = Experiment::new(&parted_room("local", 64), parted(sheet(TINT, 0.0, 0.6, 0.5))).unwrap();
-        case.scene.geometry = std::mem::take(&mut case.scene.geometry).with_path(path);
-        let (_, batches) = case.batches(1..u32::MAX);
-        let bits = batches.iter().flat_map(|b| b.sets.iter().flat_map(|s| s.value.iter().map(|v| v.to_bits())));
-        bits.collect::<Vec<_>>()
-    };
-    let plain = scores(Path::Scalar);
-    for path in Path::ALL.into_iter().filter(|p| p.is_available()) {
-        assert_eq!(scores(path), plain, "{path:?}");
-    }
+    assert_same_bits_on_every_path(&parted_room("local", 64), &parted(sheet(TINT, 0.0, 0.6, 0.5)));
 }

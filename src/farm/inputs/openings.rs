@@ -31,6 +31,10 @@ fn sentence(scene: &Scene, panels: &[&Panel], what: &str) -> Option<String> {
     Some(format!("the luminous opening of the luminaire at [{x:.3}, {y:.3}, {z:.3}]{others} {what}"))
 }
 
+fn is_of(scene: &Scene, panel: &Panel, primitive: u32) -> bool {
+    scene.sources.panel_face(primitive).is_some_and(|(_, other, _)| std::ptr::eq(panel, other))
+}
+
 /// True where a look at a face of a panel, from a side on which it shines, ends on something else in its plane.
 fn is_flush(scene: &Scene, panel: &Panel) -> bool {
     let lift = scene.geometry.lift_length();
@@ -40,8 +44,7 @@ fn is_flush(scene: &Scene, panel: &Panel) -> bool {
         let place = face.point(DVec2::new(share, (0.618 * k as f64).fract()));
         let ray = Ray { origin: place + AWAY * lift * normal, direction: -normal };
         let hit = scene.geometry.closest_hit_within(&ray, (AWAY + NEAR) * lift);
-        let its = |primitive: u32| panel.faces.iter().any(|face| face.primitive == primitive);
-        hit.is_some_and(|hit| hit.distance > (AWAY - NEAR) * lift && !its(hit.primitive))
+        hit.is_some_and(|hit| hit.distance > (AWAY - NEAR) * lift && !is_of(scene, panel, hit.primitive))
     };
     (0..PLACES).any(|k| {
         let face = &panel.faces[k * panel.faces.len() / PLACES];
@@ -63,11 +66,10 @@ fn is_cut(scene: &Scene, panel: &Panel) -> bool {
 /// The same for the panel moved by so much.
 fn is_met(scene: &Scene, panel: &Panel, by: DVec3) -> bool {
     let off = AWAY * scene.geometry.lift_length();
-    let its = |primitive: u32| panel.faces.iter().any(|face| face.primitive == primitive);
     let meets = |from: DVec3, to: DVec3| {
         let way = to - from;
         let ray = Ray { origin: from, direction: way.normalize() };
-        scene.geometry.closest_hit_within(&ray, way.length()).is_some_and(|hit| !its(hit.primitive))
+        scene.geometry.closest_hit_within(&ray, way.length()).is_some_and(|hit| !is_of(scene, panel, hit.primitive))
     };
     panel.faces.iter().any(|face| {
         let middle = face.corners.iter().sum::<DVec3>() / 3.0;
