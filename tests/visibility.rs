@@ -140,7 +140,7 @@ fn compare(name: &str, geometry: Geometry, brute: &Brute, apex: Vec3, points: &[
         geometry = geometry.with_path(path);
         let tile = Points::new(&geometry, points);
         let mut seen = asked;
-        geometry.hide(apex, &tile, &mut seen, &mut Scratch::default());
+        geometry.hide(&geometry.apex(apex), &tile, &mut seen, &mut Scratch::default());
         for (i, &point) in points.iter().enumerate() {
             let bit = |lanes: &Lanes| lanes[i / BUNDLE] >> (i % BUNDLE) & 1;
             let which = format!("{name}, {path:?}: point {i} of {}: {apex:?} to {point:?}", points.len());
@@ -442,7 +442,7 @@ fn keeps_in(closed: &Closed, tiles: usize) {
             geometry = geometry.with_path(path);
             let tile = Points::new(&geometry, &points);
             let mut seen: Lanes = [u16::MAX; BUNDLES];
-            geometry.hide(apex, &tile, &mut seen, &mut Scratch::default());
+            geometry.hide(&geometry.apex(apex), &tile, &mut seen, &mut Scratch::default());
             assert_eq!(seen, [0; BUNDLES], "{name}, {path:?}: tile {i} leaks from {apex}");
         }
     }

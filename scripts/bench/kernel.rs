@@ -100,7 +100,7 @@ fn facing(vertex: &Place, receivers: &[Place]) -> Vec<Lanes> {
 fn shadow(geometry: &Geometry, apex: Vec3, tiles: &[Points], seen: &mut [Lanes]) {
     let mut scratch = Scratch::default();
     for (tile, seen) in tiles.iter().zip(seen) {
-        geometry.hide(apex, tile, seen, &mut scratch);
+        geometry.hide(&geometry.apex(apex), tile, seen, &mut scratch);
     }
 }
 

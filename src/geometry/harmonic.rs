@@ -20,9 +20,12 @@
 pub(in crate::geometry) mod beside;
 mod between;
 mod bounds;
+mod cage;
 pub mod file;
 mod hull;
+mod landing;
 mod lattice;
+mod outline;
 mod placed;
 mod projection;
 mod regions;
@@ -34,6 +37,7 @@ mod shells;
 mod steps;
 
 pub use bounds::Bounds;
+pub(in crate::geometry) use outline::Prospect;
 pub use placed::Harmonic;
 pub use projection::{basis, projection};
 pub use series::{Bend, MAX_DEGREE, Series, Slope};
@@ -56,11 +60,6 @@ const MANY_STEPS: usize = 64;
 const STEEP: f64 = 1e-8;
 /// Guard against a line of that kind whose steps are lost in rounding.
 const MOST_STEPS: usize = 1 << 16;
-
-/// Steps of Newton's method, at most.
-const NEWTON: usize = 6;
-/// F in units of the largest radius from where on one more step is exact.
-const CONVERGED: f64 = 1e-11;
 
 /// A series as a surface, in its own coordinates.
 #[derive(Clone, Debug)]
@@ -145,7 +144,7 @@ impl Star {
 
     /// The first crossing of the line from `o` along the unit vector `d`, at most `limit` away.
     pub fn first_crossing(&self, o: DVec3, d: DVec3, limit: f64) -> Option<Crossing> {
-        match self.march(o, d, limit, |fall, _| self.only_crossing(o, d, fall))? {
+        match self.march(o, d, limit, |fall, _| self.landing(o, d, fall))? {
             // Rounding may put it beyond the ball, whose end is no limit.
             Met::Settled(crossing) => (crossing.distance <= limit).then_some(crossing),
             Met::Reached(distance, height) => {
@@ -207,16 +206,17 @@ impl Star {
             };
             // From inside the bounds hold outside the core only, beyond which all is known.
             let beyond = |next: f64, side: f64| if side < 0.0 && at < core.start { next.min(core.end) } else { next };
-            if guessed * guess.value > 2.0 * errors.value {
-                side = guessed;
-                at = beyond(at + step(&guess.times(side).less(errors), side), side);
-                continue;
-            }
+            let is_certain = guessed * guess.value > 2.0 * errors.value;
+            side = if is_certain { guessed } else { side };
             let fall = Fall { from: at, side, along: guess.times(side), errors, around };
             if side != 0.0
                 && let Some(settled) = self.certain_fall(x, &fall).and_then(|way| settle(&fall, way))
             {
                 return Some(Met::Settled(settled));
+            }
+            if is_certain {
+                at = beyond(at + step(&fall.along.less(errors), side), side);
+                continue;
             }
             let here = self.height(x, d);
             if side == 0.0 {
@@ -241,38 +241,13 @@ impl Star {
     fn certain_fall(&self, x: DVec3, fall: &Fall) -> Option<f64> {
         let Fall { along, errors, around, .. } = fall;
         let (length, reach) = (x.length(), self.samples.reach());
-        let [most, _] = around.of_lines((1.0 - reach) * length, -1.0);
         let (value, steep) = (along.value.max(0.0) + errors.value, -along.first - errors.first);
-        // At twice the way to the zero of the tangent F is below 0, and its slope still is.
-        let falls = steep > 0.0 && 4.0 * most * value < steep * steep;
-        (falls && 2.0 * value <= steep * reach * length).then(|| 2.0 * value / steep)
-    }
-
-    /// The crossing of the line from `o` along `d` where F, or -F, certainly falls through 0: by Newton's method with the second derivative of
-    /// the samples.
-    fn only_crossing(&self, o: DVec3, d: DVec3, fall: &Fall) -> Option<Crossing> {
-        let Fall { from, side: sign, along, .. } = fall;
-        let way = |value: f64, fall: f64| value / fall * (1.0 + 0.5 * along.second * value / (fall * fall));
-        let mut at = from + way(along.value, -along.first);
-        for _ in 0..NEWTON {
-            let x = o + at * d;
-            let length = x.length();
-            let n = x / length;
-            let slope = self.series.slope(n);
-            let value = sign * (length - slope.value);
-            let fall = -sign * (n.dot(d) - slope.gradient.dot(d) / length);
-            if fall.is_nan() || fall <= 0.0 {
-                return None;
-            }
-            at += way(value, fall);
-            if value.abs() <= CONVERGED * self.bounds.high {
-                let (normal, _) = normal_and_area(&slope, n);
-                let there = (o + at * d).normalize();
-                let position = (slope.value + slope.gradient.dot(there - n)) * there;
-                return Some(Crossing { distance: at, position, normal });
-            }
+        if steep <= 0.0 || 2.0 * value > steep * reach * length {
+            return None;
         }
-        None
+        let [most, _] = around.of_lines((1.0 - reach) * length, -1.0);
+        // At twice the way to the zero of the tangent F is below 0, and its slope still is.
+        (4.0 * most * value < steep * steep).then(|| 2.0 * value / steep)
     }
 
     /// The crossing of the line from `o` along `d` that is at the distance `at`.

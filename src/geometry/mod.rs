@@ -11,6 +11,7 @@
 
 #![allow(clippy::needless_range_loop, reason = "several arrays go by one axis, lane or channel")]
 
+mod apex;
 mod binary;
 mod bvh;
 pub mod harmonic;
@@ -29,6 +30,7 @@ mod sphere;
 mod veils;
 pub mod visibility;
 
+pub use apex::Apex;
 pub use bvh::Build;
 pub use harmonic::Harmonic;
 pub use mesh::Mesh;

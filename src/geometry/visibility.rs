@@ -25,7 +25,7 @@ use super::planes::{Against, Decided, Directions, Extent, Planes, Rows};
 use super::points::{Corners, Ends};
 use super::shaft::Shaft;
 use super::simd::{Isa, Kernel, Vector};
-use super::{Geometry, Sphere};
+use super::{Apex, Geometry, Sphere};
 use crate::math::Vec3;
 use arrayvec::ArrayVec;
 
@@ -54,9 +54,9 @@ pub type Lanes = [u16; BUNDLES];
 
 impl Geometry {
     /// Clears the bits of the points in `seen` that `apex` does not see.
-    pub fn hide(&self, apex: Vec3, points: &Points, seen: &mut Lanes, scratch: &mut Scratch) {
-        self.mesh.hide(apex, &points.ends, seen, scratch);
-        let far = apex.as_dvec3();
+    pub fn hide(&self, apex: &Apex, points: &Points, seen: &mut Lanes, scratch: &mut Scratch) {
+        self.mesh.hide(apex.at, &points.ends, seen, scratch);
+        let far = apex.at.as_dvec3();
         for (plane, [front, behind]) in self.planes.iter().zip(&points.sides) {
             let height = plane.height(far);
             let blocked = if height > 0.0 { Some(behind) } else { (height < 0.0).then_some(front) };
@@ -65,10 +65,11 @@ impl Geometry {
             }
         }
         for (sphere, inside) in self.spheres.iter().zip(&points.inside) {
-            shadow_of_sphere(sphere, apex, points, inside, seen);
+            shadow_of_sphere(sphere, apex.at, points, inside, seen);
         }
-        for (harmonic, beside) in self.harmonics.iter().zip(&points.beside) {
-            harmonic.hide(apex, points, beside, seen, scratch);
+        let harmonics = self.harmonics.iter().zip(&apex.prospects);
+        for ((harmonic, prospect), beside) in harmonics.zip(&points.beside) {
+            harmonic.hide((apex.at, prospect), points, beside, seen, scratch);
         }
     }
 }

@@ -21,6 +21,7 @@ use super::receiver::Receiver;
 use super::totals::{Column, Sums, Totals};
 use super::varying::Varying;
 use super::veils;
+use crate::geometry::Apex;
 use crate::geometry::simd::exact::{Triple, dot, scale, splat, sub};
 use crate::geometry::simd::{Isa, Kernel, Vector};
 use crate::geometry::visibility::{BUNDLE, BUNDLES, Lanes, Points, Scratch};
@@ -112,7 +113,7 @@ impl<const C: usize> Kernel for Channels<'_, C> {
         for history in connectors.iter(histories).filter(|h| !(idle && h.is_empty())) {
             sums.clear();
             for vertex in history.iter().filter(|v| rule.orders.contains(&(v.order + tile.depth))) {
-                tile.add::<I, C>(scene, vertex, rule.bound as f32, &mut sums, &mut scratch);
+                tile.add::<I, C>(scene, (vertex, connectors.apex(vertex)), rule.bound as f32, &mut sums, &mut scratch);
             }
             totals.add(&sums, tile);
         }
@@ -195,7 +196,7 @@ impl Tile {
     fn add<I: Isa, const C: usize>(
         &self,
         scene: &Scene,
-        vertex: &Connector,
+        (vertex, apex): (&Connector, &Apex),
         bound: f32,
         sums: &mut Sums<C>,
         scratch: &mut Scratch,
@@ -209,9 +210,9 @@ impl Tile {
         if seen == [0; BUNDLES] {
             return;
         }
-        scene.geometry.hide(vertex.lifted, &self.lifted, &mut seen, scratch);
-        let veiled = scene.geometry.has_veils()
-            && veils::let_through(scene, vertex.lifted, &self.lifted, &seen, &mut sums.through);
+        scene.geometry.hide(apex, &self.lifted, &mut seen, scratch);
+        let veiled =
+            scene.geometry.has_veils() && veils::let_through(scene, apex.at, &self.lifted, &seen, &mut sums.through);
         let through = veiled.then_some(&sums.through);
         // No continuation finds what came from a delta scatterer: all of it is connected.
         let bound = if vertex.after_delta { f32::INFINITY } else { bound };

@@ -1,10 +1,12 @@
 //! What receivers are connected to: the vertices of histories, or points of emitters, as the kernel wants them.
 
 use super::trajectory::Vertex;
+use crate::geometry::Apex;
 use crate::math::{DVec3, PI, Vec3};
 use crate::photometry::Colour;
 use crate::scene::{LawInLanes, Scene};
 use std::ops::Range;
+use std::sync::Arc;
 
 /// The golden section.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
@@ -27,7 +29,8 @@ pub fn dealing(count: usize) -> impl Iterator<Item = usize> {
 #[derive(Clone, Debug)]
 pub(super) struct Connector {
     pub(super) position: Vec3,
-    pub(super) lifted: Vec3,
+    /// Number of the lifted point.
+    apex: u32,
     pub(super) normal: Vec3,
     /// W_n rho / pi of a Lambert vertex \[lm/sr\].
     pub(super) intensity: [f32; 3],
@@ -85,6 +88,8 @@ pub struct LitPoint {
 #[derive(Debug, Default)]
 pub struct Connectors {
     all: Vec<Connector>,
+    /// Their lifted points.
+    apexes: Arc<Vec<Apex>>,
     /// End of each history in `all`.
     ends: Vec<usize>,
 }
@@ -93,25 +98,44 @@ impl Connectors {
     /// Appends the vertices of the next history.
     pub fn push(&mut self, scene: &Scene, history: &[Vertex]) {
         for vertex in history {
-            self.all.push(connector(scene, vertex));
-            self.all.extend(transmitting(scene, vertex));
+            let apex = self.lift(scene, vertex.position, vertex.normal);
+            self.all.push(connector(scene, vertex, apex));
+            if let Some((_, tau)) = scene.surface(vertex.primitive).reflectance.sides() {
+                let apex = self.lift(scene, vertex.position, -vertex.normal);
+                self.all.push(transmitting(scene, vertex, tau, apex));
+            }
         }
         self.ends.push(self.all.len());
     }
 
     /// Appends points of emitters in the place of the vertices of a history; no reflection counts.
     pub fn push_lit(&mut self, scene: &Scene, points: &[LitPoint]) {
-        self.all.extend(points.iter().map(|p| Connector {
-            position: p.position.as_vec3(),
-            lifted: scene.geometry.lift(p.position, p.normal).as_vec3(),
-            normal: p.normal.as_vec3(),
-            intensity: p.intensity.0.map(|c| c as f32),
-            order: 0,
-            after_delta: false,
-            glossy: None,
-            emitter: Some(p.emitter),
-        }));
+        for p in points {
+            let apex = self.lift(scene, p.position, p.normal);
+            self.all.push(Connector {
+                position: p.position.as_vec3(),
+                apex,
+                normal: p.normal.as_vec3(),
+                intensity: p.intensity.0.map(|c| c as f32),
+                order: 0,
+                after_delta: false,
+                glossy: None,
+                emitter: Some(p.emitter),
+            });
+        }
         self.ends.push(self.all.len());
+    }
+
+    /// The number of the lifted point of one more connector, on the side of `normal`.
+    fn lift(&mut self, scene: &Scene, position: DVec3, normal: DVec3) -> u32 {
+        let apexes = Arc::make_mut(&mut self.apexes);
+        apexes.push(scene.geometry.apex(scene.geometry.lift(position, normal).as_vec3()));
+        apexes.len() as u32 - 1
+    }
+
+    /// The lifted point of a connector.
+    pub(super) fn apex(&self, of: &Connector) -> &Apex {
+        &self.apexes[of.apex as usize]
     }
 
     /// Number of histories, those without vertices included.
@@ -132,7 +156,7 @@ impl Connectors {
     /// The vertices with the numbers `chosen`, each with a factor of its weight, dealt in turn to so many histories, of which any few that
     /// follow each other hold some from everywhere.
     pub(super) fn dealt(&self, chosen: &[(usize, f32)], histories: usize) -> Connectors {
-        let mut dealt = Connectors::default();
+        let mut dealt = Connectors { apexes: Arc::clone(&self.apexes), ..Connectors::default() };
         for first in dealing(histories) {
             for &(number, factor) in chosen.iter().skip(first).step_by(histories) {
                 dealt.all.push(self.all[number].weighted(factor));
@@ -148,13 +172,13 @@ impl Connectors {
     }
 }
 
-fn connector(scene: &Scene, v: &Vertex) -> Connector {
+fn connector(scene: &Scene, v: &Vertex, apex: u32) -> Connector {
     let reflectance = scene.reflectance(v.primitive, v.position);
     let lambert = reflectance.lambert().or(reflectance.sides().map(|(same_side, _)| same_side));
     let narrow = |c: Colour| c.0.map(|c| c as f32);
     Connector {
         position: v.position.as_vec3(),
-        lifted: scene.geometry.lift(v.position, v.normal).as_vec3(),
+        apex,
         normal: v.normal.as_vec3(),
         intensity: narrow(v.weight * lambert.unwrap_or(Colour::BLACK) / PI),
         order: v.order,
@@ -172,12 +196,10 @@ fn connector(scene: &Scene, v: &Vertex) -> Connector {
     }
 }
 
-/// What a vertex on a surface that sends light to both sides sends to the other one.
-fn transmitting(scene: &Scene, v: &Vertex) -> Option<Connector> {
-    let (_, tau) = scene.surface(v.primitive).reflectance.sides()?;
+/// What a vertex on a surface that sends the share `tau` of light to the other side sends there.
+fn transmitting(scene: &Scene, v: &Vertex, tau: Colour, apex: u32) -> Connector {
     let intensity = (v.weight * tau / PI).0.map(|c| c as f32);
-    let lifted = scene.geometry.lift(v.position, -v.normal).as_vec3();
-    Some(Connector { lifted, normal: -v.normal.as_vec3(), intensity, ..connector(scene, v) })
+    Connector { normal: -v.normal.as_vec3(), intensity, ..connector(scene, v, apex) }
 }
 
 #[cfg(test)]

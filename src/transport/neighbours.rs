@@ -56,8 +56,8 @@ impl Neighbours {
             let near = factors[i] > self.bound && self.responses[i].is_some();
             seen[i / BUNDLE] |= u16::from(near) << (i % BUNDLE);
         }
-        let apex = scene.geometry.lift(y.position, y.normal).as_vec3();
-        scene.geometry.hide(apex, &self.lifted, &mut seen, scratch);
+        let apex = scene.geometry.apex(scene.geometry.lift(y.position, y.normal).as_vec3());
+        scene.geometry.hide(&apex, &self.lifted, &mut seen, scratch);
         // The ray by which it was found has seen it, whatever rounding makes of the segment.
         seen[own / BUNDLE] |= 1 << (own % BUNDLE);
         let is_seen = |i: usize| seen[i / BUNDLE] >> (i % BUNDLE) & 1 == 1;

@@ -182,7 +182,8 @@ pub fn of_lights(scene: &Scene, receivers: &[Receiver], asked: &[Asked]) -> Vec<
             | Light::Spot { position, .. }
             | Light::CosPower { position, .. }
             | Light::Luminaire(Luminaire { position, .. }) => {
-                scene.geometry.hide(position.as_vec3(), &points, &mut seen, &mut Scratch::default());
+                let apex = scene.geometry.apex(position.as_vec3());
+                scene.geometry.hide(&apex, &points, &mut seen, &mut Scratch::default());
             }
         }
         for (i, (receiver, (_, w_in, across))) in receivers.iter().zip(&arriving).enumerate() {

@@ -38,6 +38,23 @@ fn place(geometry: &Geometry, object: &Harmonic, rng: &mut Generator) -> Vec3 {
     }
 }
 
+/// How many of the points of a tile `apex` does not see: as by the series alone, one by one and in the tile, on every path.
+fn hidden(name: &str, geometry: &mut Geometry, object: &Harmonic, apex: Vec3, points: &[Vec3]) -> usize {
+    let expected: Vec<bool> = points.iter().map(|&p| !crosses(object, apex, p)).collect();
+    for path in Path::ALL.into_iter().filter(|p| p.is_available()) {
+        *geometry = std::mem::take(geometry).with_path(path);
+        let mut seen: Lanes = [u16::MAX; BUNDLES];
+        let tile = Points::new(geometry, points);
+        geometry.hide(&geometry.apex(apex), &tile, &mut seen, &mut Scratch::default());
+        for (i, (&p, &expected)) in points.iter().zip(&expected).enumerate() {
+            assert_eq!(geometry.visible(apex, p), expected, "{name}: {apex} {p}");
+            let in_tile = seen[i / BUNDLE] >> (i % BUNDLE) & 1 == 1;
+            assert_eq!(in_tile, expected, "{name}, {path:?}, in a tile: {apex} {p}");
+        }
+    }
+    expected.iter().filter(|seen| !**seen).count()
+}
+
 #[test]
 fn segments_are_blocked_as_by_the_series_alone() {
     for (name, series) in [("reference", objects::reference()), ("rough", objects::rough(16, &mut generator("rough")))]
@@ -48,22 +65,33 @@ fn segments_are_blocked_as_by_the_series_alone() {
         for _ in 0..24 {
             let apex = place(&geometry, &object, &mut rng);
             let points: Vec<Vec3> = (0..TILE).map(|_| place(&geometry, &object, &mut rng)).collect();
-            let expected: Vec<bool> = points.iter().map(|&p| !crosses(&object, apex, p)).collect();
-            blocked += expected.iter().filter(|seen| !**seen).count();
+            blocked += hidden(name, &mut geometry, &object, apex, &points);
             count += TILE;
-            for path in Path::ALL.into_iter().filter(|p| p.is_available()) {
-                geometry = geometry.with_path(path);
-                let mut seen: Lanes = [u16::MAX; BUNDLES];
-                geometry.hide(apex, &Points::new(&geometry, &points), &mut seen, &mut Scratch::default());
-                for (i, (&p, &expected)) in points.iter().zip(&expected).enumerate() {
-                    assert_eq!(geometry.visible(apex, p), expected, "{name}: {apex} {p}");
-                    let in_tile = seen[i / BUNDLE] >> (i % BUNDLE) & 1 == 1;
-                    assert_eq!(in_tile, expected, "{name}, {path:?}, in a tile: {apex} {p}");
-                }
-            }
         }
         assert!(blocked > count / 5 && blocked < count * 4 / 5, "{name}: {blocked} of {count}");
     }
+}
+
+#[test]
+fn tiles_beyond_beside_and_before_an_object_are_seen_as_by_the_series_alone() {
+    let (mut geometry, object) = room(objects::rough(16, &mut generator("rough")));
+    let mut rng = generator("tiles");
+    let mut hidden_of = [0; 3];
+    for _ in 0..60 {
+        // Tiles in a plane far and near, of which some lie in the shadow and some along its edge.
+        let mut outside = || DVec3::new(0.3, -0.2, 0.4) + sphere(rng.uniform2()) * (1.7 + 1.5 * rng.uniform());
+        let (apex, middle) = (outside().as_vec3(), outside());
+        let (e, f) = lampyris::math::frame(sphere(rng.uniform2()));
+        let size = 0.02 + 0.6 * rng.uniform();
+        let mut point = || middle + size * ((rng.uniform() - 0.5) * e + (rng.uniform() - 0.5) * f);
+        let points: Vec<Vec3> = (0..TILE).map(|_| point().as_vec3()).collect();
+        match hidden("tiles", &mut geometry, &object, apex, &points) {
+            0 => hidden_of[0] += 1,
+            TILE => hidden_of[2] += 1,
+            _ => hidden_of[1] += 1,
+        }
+    }
+    assert!(hidden_of.iter().all(|&count| count >= 5), "{hidden_of:?} seen, in part and hidden");
 }
 
 #[test]

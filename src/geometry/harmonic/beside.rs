@@ -14,13 +14,14 @@ pub(in crate::geometry) struct Beside {
     pub(in crate::geometry) inside: bool,
     /// Maybe inside the outer mesh.
     pub(in crate::geometry) near: bool,
-    /// Certainly outside of the coarser outer mesh too.
-    pub(super) far: bool,
     /// How the distance to the surface grows there, of points near but not inside.
     pub(super) rise: Option<Rise>,
 }
 
 impl Beside {
+    /// Certainly outside of all meshes.
+    pub(super) const FAR: Beside = Beside { inside: false, near: false, rise: None };
+
     /// The share of the way `d` from there that is certainly clear; `None` where all of it is, and all beyond.
     pub(super) fn clear(&self, d: Vec3) -> Option<f32> {
         self.rise.map_or(Some(0.0), |rise| rise.clear(d))
@@ -42,8 +43,11 @@ impl TileBeside {
     pub(in crate::geometry) fn new(object: &Harmonic, points: &[Vec3]) -> Self {
         let mut tile = TileBeside { inside: [0; BUNDLES], near: [0; BUNDLES], rises: None };
         for (i, &point) in points.iter().enumerate() {
-            let (bundle, lane) = (i / BUNDLE, i % BUNDLE);
             let Beside { inside, near, rise, .. } = object.beside(point.as_dvec3());
+            if !(inside || near) {
+                continue;
+            }
+            let (bundle, lane) = (i / BUNDLE, i % BUNDLE);
             tile.inside[bundle] |= u16::from(inside) << lane;
             tile.near[bundle] |= u16::from(near) << lane;
             if let Some(rise) = rise {
@@ -53,11 +57,17 @@ impl TileBeside {
         tile
     }
 
-    /// The points `asked`, each as far towards `apex` as its way there is certainly clear, `None` where none of them moves; and those where all of it
-    /// is.
-    pub(super) fn towards(&self, path: Path, apex: Vec3, ends: &Ends, asked: &Lanes) -> (Option<Ends>, Lanes) {
-        let rises = self.rises.as_ref();
-        rises.map_or((None, [0; BUNDLES]), |rises| path.run(Leave { rises, apex, asked, ends }))
+    /// Puts into `moved` the points `asked`, each as far towards `apex` as its way there is certainly clear, where any of them moves; gives those where all
+    /// of it is.
+    pub(super) fn towards(
+        &self,
+        path: Path,
+        apex: Vec3,
+        ends: &Ends,
+        asked: &Lanes,
+        moved: &mut Option<Ends>,
+    ) -> Lanes {
+        self.rises.as_ref().map_or([0; BUNDLES], |rises| path.run(Leave { rises, apex, asked, ends, moved }))
     }
 }
 

@@ -1,12 +1,14 @@
 //! Rays and segments in the world against a star-shaped object: meshes first, the series for what is left.
 //!
-//! Between two points outside: what crosses the inner mesh is blocked; what does not cross the outer one, where an end is certainly outside of that
-//! too, is free. A point just outside of the surface stands within the outer mesh, and nearly every segment from there would cross it. So
+//! Between two points outside: what a plane stands before is free (`hull`); what passes beside the outline from a point is free too, what passes through
+//! it beyond the object is blocked (`outline`). For what is left, that which crosses the inner mesh is blocked; that which does not cross the outer
+//! one, where an end is certainly outside of that too, is free. A point just outside of the surface stands within the outer mesh, and nearly every segment from there would cross it. So
 //! its end is moved along the segment first, as far as that is certainly clear (`rise`). A way that is moved off by rounding stays within
 //! the room that the meshes leave.
 
 use super::Crossing;
 use super::beside::{Beside, TileBeside, shares};
+use super::outline::{Outline, Prospect, Sort};
 use super::placed::{Harmonic, Pair, Shelled};
 use super::rise::Shares;
 use crate::geometry::mesh::bits;
@@ -49,12 +51,15 @@ impl Harmonic {
     /// Clears the bits of the points in `seen` that `apex` does not see for this object, `beside` which they are.
     pub(in crate::geometry) fn hide(
         &self,
-        apex: Vec3,
+        (apex, prospect): (Vec3, &Prospect),
         points: &Points,
         beside: &TileBeside,
         seen: &mut Lanes,
         scratch: &mut Scratch,
     ) {
+        if self.is_apart(apex, points, beside) {
+            return;
+        }
         let here = self.beside(apex.as_dvec3());
         for (seen, inside) in seen.iter_mut().zip(&beside.inside) {
             *seen &= if here.inside { *inside } else { !inside };
@@ -66,7 +71,8 @@ impl Harmonic {
             let whole = |bundle, lane| [apex, points.point(bundle, lane)];
             return clear_bits(seen, *seen, |bundle, lane| self.crosses(&Segment::inside(whole(bundle, lane))));
         };
-        let (moved, mut free) = beside.towards(shells.fine.outer.path, apex, &points.ends, seen);
+        let mut moved = None;
+        let mut free = beside.towards(shells.fine.outer.path, apex, &points.ends, seen, &mut moved);
         let ends = moved.as_ref().unwrap_or(&points.ends);
         *seen = joined(seen, &free, |seen, free| seen & !free);
         let tile = Tile { apex, points, ends, near: &beside.near };
@@ -75,19 +81,46 @@ impl Harmonic {
             *seen = joined(seen, &free, |seen, free| seen | free);
             return;
         }
-        // Points on the surface are within the coarse outer mesh even where they are moved.
-        let coarse = (here.far && moved.is_none()).then_some(&shells.coarse);
+        // What points on the surface are seen past is the surface around them.
+        let others = joined(seen, &beside.near, |seen, near| seen & !near);
         let mut open = *seen;
-        for pair in [coarse, Some(&shells.fine)].into_iter().flatten() {
-            if open == [0; BUNDLES] {
-                break;
-            }
-            let (certain, left) = pair.decide((apex, None), ends, &open, scratch);
+        if others != [0; BUNDLES]
+            && let Some(outline) = prospect.get_or_init(|| self.outline(apex))
+        {
+            let sort = Sort { outline, apex, ends: &points.ends, asked: &others };
+            let (certain, blocked) = shells.fine.outer.path.run(sort);
+            free = joined(&free, &certain, |free, certain| free | certain);
+            open =
+                joined(&open, &joined(&certain, &blocked, |free, blocked| free | blocked), |open, known| open & !known);
+        }
+        if open != [0; BUNDLES] {
+            let (certain, left) = shells.fine.decide((apex, None), ends, &open, scratch);
             free = joined(&free, &certain, |free, certain| free | certain);
             open = left;
         }
         *seen = joined(&free, &open, |free, open| free | open);
         clear_bits(seen, open, |bundle, lane| self.crosses(&tile.segment(bundle, lane, 0.0, false)));
+    }
+
+    /// True where a plane certainly stands between the object and all segments from `apex` to the points of a tile.
+    fn is_apart(&self, apex: Vec3, points: &Points, beside: &TileBeside) -> bool {
+        let none = [0; BUNDLES];
+        let Some(shells) = self.shells.as_ref().filter(|_| beside.near == none && beside.inside == none) else {
+            return false;
+        };
+        let (low, high) = points.ends.tile;
+        let (low, high) = (DVec3::from(low.map(f64::from)), DVec3::from(high.map(f64::from)));
+        let (middle, half) = (0.5 * (low + high) - self.center, 0.5 * (high - low));
+        // Points far from all have no part in the box.
+        points.ends.far == none && shells.hull.is_apart(&self.to_world, apex.as_dvec3() - self.center, (middle, half))
+    }
+
+    /// How the object is seen from `apex` \[m\].
+    pub(super) fn outline(&self, apex: Vec3) -> Option<Box<Outline>> {
+        let (center, high, _) = self.around();
+        let low = self.star.bounds.low / self.shrunk;
+        let cage = &self.shells.as_ref()?.cage;
+        Outline::new(cage, (low, high), apex.as_dvec3() - center).map(Box::new)
     }
 
     /// The same for an `apex` that may be within the outer meshes, where it is `here`.
@@ -201,15 +234,13 @@ impl Harmonic {
         }
     }
 
-    /// False where `ray` certainly misses the ball around the outer mesh before `limit`.
+    /// False where `ray` certainly misses the ball around the meshes before `limit`.
     fn passes(&self, ray: &Ray, limit: f64) -> bool {
-        let Some(shells) = &self.shells else { return true };
-        let (origin, way) = (self.to_own * (ray.origin - self.center), self.to_own * ray.direction);
-        let (scale2, along) = (way.length_squared(), -origin.dot(way));
-        let radius = self.star.bounds.high * shells.fine.reach;
-        let under = radius * radius - (origin + along / scale2 * way).length_squared();
-        let half = (under.max(0.0) * scale2).sqrt();
-        under >= 0.0 && along + half >= 0.0 && along - half <= limit * scale2
+        let from = ray.origin - self.center;
+        let along = -from.dot(ray.direction);
+        let under = self.reach2 - (from + along * ray.direction).length_squared();
+        let half = under.max(0.0).sqrt();
+        under >= 0.0 && along + half >= 0.0 && along - half <= limit
     }
 
     /// What `ray` meets at `line`.

@@ -8,6 +8,7 @@
 //! (M. Riesz). So a sample at most h from the place of the maximum is at least M cos(N h), and no more than samples/cos(N h) is
 //! anywhere. The third derivative is at most N times the second (Bernstein).
 
+use super::regions::Shape;
 use super::series::{Bend, Series};
 use crate::math::{DMat3, DVec3, cos, frame};
 
@@ -46,7 +47,7 @@ impl Bounds {
 }
 
 /// The bounds of `series` by its coefficients and by samples, directions at most `h` apart from any other, whichever say less.
-pub(super) fn sup(series: &Series, samples: &[(DVec3, Bend)], h: f64) -> Bounds {
+pub(super) fn sup(series: &Series, samples: &[Shape], h: f64) -> Bounds {
     let rough = Bounds::of_coefficients(series);
     let degree = series.degree() as f64;
     let share = cos((degree * h).min(2.0));
@@ -54,11 +55,9 @@ pub(super) fn sup(series: &Series, samples: &[(DVec3, Bend)], h: f64) -> Bounds 
         return rough;
     }
     let (mut low, mut high, mut first, mut second) = (f64::INFINITY, f64::NEG_INFINITY, 0f64, 0f64);
-    for (n, bend) in samples {
-        let (most, least) = bends(bend, *n);
-        (low, high) = (low.min(bend.value), high.max(bend.value));
-        first = first.max(bend.slope(*n).gradient.length());
-        second = second.max(most).max(-least);
+    for shape in samples {
+        (low, high) = (low.min(shape.value), high.max(shape.value));
+        (first, second) = (first.max(shape.first), second.max(shape.second));
     }
     let whole = |sampled: f64, rough: f64| (sampled / share * (1.0 + ROUNDING)).min(rough);
     let second = whole(second, rough.second);

@@ -7,7 +7,7 @@
 //! h(n) <= s sum w_ij h((1, u_i, v_j))
 //! ```
 
-use crate::math::DVec3;
+use crate::math::{DMat3, DVec3};
 use rayon::prelude::*;
 use std::collections::HashSet;
 
@@ -51,6 +51,23 @@ impl Hull {
     /// Memory \[bytes\].
     pub(super) fn bytes(&self) -> u64 {
         size_of_val(&self.support[..]) as u64
+    }
+
+    /// True where a plane certainly stands between the surface, which `to_world` places, and all ways from `apex` to a box, of which the middle and half the
+    /// extents are given, both seen from the centre.
+    pub(super) fn is_apart(&self, to_world: &DMat3, apex: DVec3, (middle, half): (DVec3, DVec3)) -> bool {
+        let way = middle - apex;
+        let length2 = way.length_squared().max(f64::MIN_POSITIVE);
+        // Across the nearest point of the way to the middle.
+        let share = (-apex.dot(way) / length2).clamp(0.0, 1.0);
+        let n = apex + share * way;
+        let beyond = |n: DVec3| [n.dot(apex), n.dot(middle) - n.abs().dot(half)];
+        // Turned until apex and box are as far beyond it, where the box is nearer.
+        let [of_apex, of_box] = beyond(n);
+        let gained = (length2 - way.abs().dot(half)).max(f64::MIN_POSITIVE);
+        let n = n + ((of_apex - of_box) / gained).clamp(0.0, 1.0) * way;
+        let [of_apex, of_box] = beyond(n);
+        of_apex.min(of_box) > self.support(to_world.transpose() * n)
     }
 
     /// No point of the surface has a greater product with `n`.
@@ -119,5 +136,31 @@ mod tests {
             let exact = triangles.iter().flatten().map(|&c| axis.dot(c)).fold(0.0, f64::max);
             assert!((hull.support(axis) - exact).abs() < 1e-11, "{axis}");
         }
+    }
+
+    #[test]
+    fn ways_beyond_a_plane_pass_a_ball() {
+        let mut rng = Stream::new(5, Domain::Receiver, "apart").generator(0);
+        let triangles: Vec<[DVec3; 3]> = (0..3000).map(|_| [(); 3].map(|()| sphere(rng.uniform2()))).collect();
+        let hull = Hull::new(&triangles);
+        let (mut apart, mut clear) = (0, 0);
+        for _ in 0..4000 {
+            let mut place = || sphere(rng.uniform2()) * (1.1 + 2.0 * rng.uniform());
+            let (apex, middle) = (place(), place());
+            let half = 0.2 * DVec3::new(rng.uniform(), rng.uniform(), rng.uniform());
+            let corner =
+                |k: u32| middle + half * DVec3::from([0, 1, 2].map(|axis| f64::from(k >> axis & 1) * 2.0 - 1.0));
+            let nearest = |to: DVec3| {
+                let way = to - apex;
+                (apex + way * (-apex.dot(way) / way.length_squared()).clamp(0.0, 1.0)).length()
+            };
+            let nearest = (0..8).map(|k| nearest(corner(k))).fold(f64::INFINITY, f64::min);
+            let is_apart = hull.is_apart(&DMat3::IDENTITY, apex, (middle, half));
+            // Of corners some hundredths apart.
+            assert!(!is_apart || nearest > 0.99, "{apex} {middle} {half}: {nearest}");
+            (apart, clear) = (apart + usize::from(is_apart), clear + usize::from(nearest > 1.0));
+        }
+        // One plane through both ends does not part all that could be.
+        assert!(apart <= clear && 10 * apart > 8 * clear, "{apart} of {clear}");
     }
 }

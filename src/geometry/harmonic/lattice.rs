@@ -44,11 +44,33 @@ impl Lattice {
         })
     }
 
-    /// The same for all points with the same z that others become by mirrors in x, y and x = y: their directions have the same z and
-    /// x^2 + y^2 to the last bit.
-    pub(super) fn round(&self, [i, j, k]: [usize; 3]) -> [usize; 3] {
-        let [a, b] = [i, j].map(|i| i.max(self.cells - i));
-        [a.max(b), a.min(b), k]
+    /// One of each [`Self::round`] of its points.
+    pub(super) fn rounds(&self) -> impl Iterator<Item = [usize; 3]> {
+        let n = self.cells;
+        let upper = n.div_ceil(2)..=n;
+        upper.flat_map(move |i| {
+            (n.div_ceil(2)..=i).flat_map(move |j| (0..=n).step_by(if i == n { 1 } else { n }).map(move |k| [i, j, k]))
+        })
+    }
+
+    /// What mirrors in x, y and x = y make of a point, some twice where it lies on one: their directions have the same z and x^2 + y^2 to the
+    /// last bit.
+    pub(super) fn round(&self, [i, j, k]: [usize; 3]) -> [[usize; 3]; 8] {
+        let n = self.cells;
+        let quarter = |i: usize, j: usize| [[i, j, k], [n - i, j, k], [i, n - j, k], [n - i, n - j, k]];
+        let [[a, b, c, d], [e, f, g, h]] = [quarter(i, j), quarter(j, i)];
+        [a, b, c, d, e, f, g, h]
+    }
+
+    /// Where a point lies on the faces, as [`Self::on_face`] has it: on up to three.
+    pub(super) fn faces(&self, at: [usize; 3]) -> impl Iterator<Item = [usize; 3]> {
+        let ends = (0..3).filter(move |&axis| at[axis] == 0 || at[axis] == self.cells);
+        ends.map(move |axis| [2 * axis + usize::from(at[axis] > 0), at[(axis + 1) % 3], at[(axis + 2) % 3]])
+    }
+
+    /// The number of the point (u, v) of a face among those of all faces, face by face, u by u.
+    pub(super) fn number(&self, [face, u, v]: [usize; 3]) -> usize {
+        (face * (self.cells + 1) + u) * (self.cells + 1) + v
     }
 
     /// The direction of such a point.

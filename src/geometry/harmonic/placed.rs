@@ -1,6 +1,7 @@
 //! Star-shaped objects where they stand in the world, and the meshes that decide for most rays and segments.
 
 use super::beside::Beside;
+use super::cage::{self, Cage};
 use super::hull::Hull;
 use super::rise::Rise;
 use super::shells::Shells;
@@ -22,18 +23,24 @@ pub struct Harmonic {
     pub(super) to_world: DMat3,
     pub(super) to_own: DMat3,
     /// No way is longer by more than this factor in its own coordinates.
-    shrunk: f64,
+    pub(super) shrunk: f64,
+    /// Nor in the world by more than this.
+    stretched: f64,
+    /// Squared distance from the centre beyond which points are outside of all meshes \[m2\].
+    pub(super) reach2: f64,
     pub(super) shells: Option<Arc<Shelled>>,
 }
 
-/// Cells of the finer meshes along an edge of the cube.
+/// Cells of the meshes along an edge of the cube.
 const FINE: usize = 48;
-/// Of the coarser ones, whose triangles hide many points at once.
-const COARSE: usize = 8;
 
-/// Meshes that decide for most rays and segments between points outside: the coarser ones first, for segments whose ends are outside of both.
+/// What a distance from the centre is widened by for its rounding.
+const ROUNDING: f64 = 1.0 + 1e-9;
+
+/// What decides for most rays and segments between points outside, without the series.
 pub(super) struct Shelled {
-    pub(super) coarse: Pair,
+    /// The nets whose outline is seen.
+    pub(super) cage: Cage,
     pub(super) fine: Pair,
     /// What all of the surface lies within.
     pub(super) hull: Hull,
@@ -45,12 +52,6 @@ pub(super) struct Pair {
     pub(super) outer: Mesh,
     /// Points at least so many times as far from the centre as the surface in their direction are outside of both.
     pub(super) reach: f64,
-}
-
-impl Shelled {
-    fn pairs(&mut self) -> [&mut Pair; 2] {
-        [&mut self.coarse, &mut self.fine]
-    }
 }
 
 impl Harmonic {
@@ -65,10 +66,15 @@ impl Harmonic {
             return Err(Error::input("harmonic", "transform", format!("{to_world:?}"), allowed));
         }
         // No direction is stretched by more than the root of the sum of squares of a matrix.
-        let columns = [to_own.x_axis, to_own.y_axis, to_own.z_axis];
-        let whole = columns.iter().map(|c| c.length_squared()).sum::<f64>().sqrt();
-        let mut harmonic = Harmonic { star, center, to_world, to_own, shrunk: whole, shells: None };
-        harmonic.shrunk = harmonic.even().map_or(whole, |even| 1.0 / even);
+        let [shrunk, stretched] = [to_own, to_world].map(|by| {
+            let columns = [by.x_axis, by.y_axis, by.z_axis];
+            columns.iter().map(|c| c.length_squared()).sum::<f64>().sqrt()
+        });
+        let mut harmonic =
+            Harmonic { star, center, to_world, to_own, shrunk, stretched, reach2: f64::INFINITY, shells: None };
+        if let Some(even) = harmonic.even() {
+            (harmonic.shrunk, harmonic.stretched) = (1.0 / even, even);
+        }
         Ok(harmonic)
     }
 
@@ -76,7 +82,7 @@ impl Harmonic {
     pub(in crate::geometry) fn bytes(&self) -> u64 {
         let of = |pair: &Pair| pair.inner.bytes() + pair.outer.bytes();
         self.star.samples.bytes()
-            + self.shells.as_ref().map_or(0, |shells| of(&shells.coarse) + of(&shells.fine) + shells.hull.bytes())
+            + self.shells.as_ref().map_or(0, |shells| shells.cage.bytes() + of(&shells.fine) + shells.hull.bytes())
     }
 
     /// The object in its own coordinates.
@@ -107,11 +113,7 @@ impl Harmonic {
 
     /// Its centre, the radius of a ball about that around it \[m\], and how much longer it is here than in its own coordinates, at most.
     pub fn around(&self) -> (DVec3, f64, f64) {
-        // No direction is stretched by more than the root of the sum of squares of a matrix.
-        let columns = [self.to_world.x_axis, self.to_world.y_axis, self.to_world.z_axis];
-        let whole = columns.iter().map(|c| c.length_squared()).sum::<f64>().sqrt();
-        let stretch = self.even().unwrap_or(whole);
-        (self.center, stretch * self.star.bounds.high, stretch)
+        (self.center, self.stretched * self.star.bounds.high, self.stretched)
     }
 
     /// The same object elsewhere.
@@ -127,25 +129,28 @@ impl Harmonic {
 
     /// Where `p` is \[m\].
     pub(in crate::geometry) fn beside(&self, p: DVec3) -> Beside {
+        // Of most points no more need be known.
+        if (p - self.center).length_squared() > self.reach2 {
+            return Beside::FAR;
+        }
         let own = self.to_own * (p - self.center);
         let length = own.length();
         let (low, high) = self.star.radii();
-        let endless = [f64::INFINITY; 2];
-        let [coarse, fine] = self.shells.as_ref().map_or(endless, |shells| [shells.coarse.reach, shells.fine.reach]);
-        if length < low || length >= high * coarse.max(fine) {
-            return Beside { inside: length < low, near: length < low, far: length > low, rise: None };
+        let fine = self.shells.as_ref().map_or(f64::INFINITY, |shells| shells.fine.reach);
+        if length < low || length >= high * fine {
+            return Beside { inside: length < low, near: length < low, rise: None };
         }
         let n = own / length;
         let look = self.star.samples.look(n);
         let error = look.errors.value;
-        let [near, far] = [length <= (look.value + error) * fine, length > (look.value + error) * coarse];
+        let near = length <= (look.value + error) * fine;
         let certain = (length - look.value).abs() > error;
         let inside = if certain { length < look.value } else { length < self.star.series.value(n) };
         let frames = (&self.to_own, &self.to_world);
         let rise = |shells: &Arc<Shelled>| {
             Rise::new(own, &look, (self.star.samples.reach(), &shells.hull), frames, self.shrunk)
         };
-        Beside { inside, near, far, rise: self.shells.as_ref().filter(|_| near && !inside).map(rise) }
+        Beside { inside, near, rise: self.shells.as_ref().filter(|_| near && !inside).map(rise) }
     }
 
     /// The same object with meshes inside and outside of it, for rays that come from anywhere in the box `around` \[m\].
@@ -167,8 +172,11 @@ impl Harmonic {
             let (inner, outer) = rayon::join(|| mesh(&shells.inner), || mesh(&shells.outer));
             Pair { inner, outer, reach: shells.reach }
         };
-        let [coarse, fine] = [COARSE, FINE].map(|cells| Shells::new(&self.star, cells, margin));
-        let shelled = Shelled { coarse: pair(&coarse), fine: pair(&fine), hull: Hull::new(&fine.outer) };
+        let [coarse, fine] = [cage::CELLS, FINE].map(|cells| Shells::new(&self.star, cells, margin));
+        let cage = Cage::new(&coarse, &self.to_world);
+        let shelled = Shelled { cage, fine: pair(&fine), hull: Hull::new(&fine.outer) };
+        let reach = self.around().1 * fine.reach * ROUNDING;
+        self.reach2 = reach * reach;
         self.shells = Some(Arc::new(shelled));
         self
     }
@@ -176,7 +184,7 @@ impl Harmonic {
     /// Asks its meshes on `path`, where nobody else has them: for tests.
     pub(in crate::geometry) fn set_path(&mut self, path: Path) {
         if let Some(shells) = self.shells.as_mut().and_then(Arc::get_mut) {
-            shells.pairs().into_iter().for_each(|pair| (pair.inner.path, pair.outer.path) = (path, path));
+            (shells.fine.inner.path, shells.fine.outer.path) = (path, path);
         }
     }
 

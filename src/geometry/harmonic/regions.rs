@@ -82,11 +82,9 @@ impl Regions {
     /// exceed anywhere.
     pub(super) fn new(lattice: &Lattice, shapes: &[Shape], degree: usize, whole: Steepness) -> Regions {
         let (cells, edge) = (lattice.cells(), lattice.cells() / CELLS);
-        let side = cells + 1;
-        let number = |face: usize, u: usize, v: usize| (face * side + u) * side + v;
         let cell = |k: usize| {
             let (face, u, v) = (k / (cells * cells), k / cells % cells, k % cells);
-            let corner = |i: usize, j: usize| &shapes[number(face, u + i, v + j)];
+            let corner = |i: usize, j: usize| &shapes[lattice.number([face, u + i, v + j])];
             Cell::new([corner(0, 0), corner(0, 1), corner(1, 0), corner(1, 1)])
         };
         let all: Vec<Cell> = (0..6 * cells * cells).into_par_iter().map(cell).collect();
@@ -102,10 +100,10 @@ impl Regions {
         Regions { edge, around: spread(edge, own), third, reach: sin(angle) }
     }
 
-    /// What the derivatives do not exceed anywhere within the angle whose sine is `reach` of a direction, beside which the point [face, u, v] of a
-    /// lattice with `cells` cells lies.
-    pub(super) fn around(&self, [face, u, v]: [usize; 3], cells: usize) -> &Steepness {
-        let of = |i: usize| (i * self.edge / cells).min(self.edge - 1);
+    /// What the derivatives do not exceed anywhere within the angle whose sine is `reach` of a direction, beside which the point [face, u, v] of
+    /// their lattice lies.
+    pub(super) fn around(&self, [face, u, v]: [usize; 3]) -> &Steepness {
+        let of = |i: usize| (i / CELLS).min(self.edge - 1);
         &self.around[(face * self.edge + of(u)) * self.edge + of(v)]
     }
 
@@ -126,14 +124,16 @@ impl Regions {
 }
 
 /// A series in the direction of a point of a lattice.
+#[derive(Clone, Copy, Default)]
 pub(super) struct Shape {
-    direction: DVec3,
+    pub(super) direction: DVec3,
+    pub(super) value: f64,
     /// Magnitude of the gradient.
-    first: f64,
+    pub(super) first: f64,
     /// The greatest magnitude of a second derivative.
-    second: f64,
+    pub(super) second: f64,
     /// The second derivatives on the sphere.
-    hessian: DMat3,
+    pub(super) hessian: DMat3,
 }
 
 impl Shape {
@@ -141,7 +141,7 @@ impl Shape {
     pub(super) fn new(n: DVec3, bend: &Bend) -> Shape {
         let (most, least) = bends(bend, n);
         let (first, second) = (bend.slope(n).gradient.length(), most.max(-least));
-        Shape { direction: n, first, second, hessian: hessian(bend, n) }
+        Shape { direction: n, value: bend.value, first, second, hessian: hessian(bend, n) }
     }
 }
 

@@ -114,14 +114,16 @@ pub(super) struct Leave<'a> {
     pub(super) apex: Vec3,
     pub(super) asked: &'a Lanes,
     pub(super) ends: &'a Ends,
+    /// Where they come to; large, so not handed from call to call.
+    pub(super) moved: &'a mut Option<Ends>,
 }
 
 impl Kernel for Leave<'_> {
-    type Output = (Option<Ends>, Lanes);
+    type Output = Lanes;
 
     #[inline(always)]
-    fn run<I: Isa>(self) -> (Option<Ends>, Lanes) {
-        let (mut moved, mut free) = (None, [0; BUNDLES]);
+    fn run<I: Isa>(self) -> Lanes {
+        let (moved, mut free) = (self.moved, [0; BUNDLES]);
         let apex = splat::<I>(self.apex);
         for bundle in 0..BUNDLES {
             if self.asked[bundle] == 0 {
@@ -139,17 +141,17 @@ impl Kernel for Leave<'_> {
             if left & self.rises.1[bundle] != 0 {
                 let to = [d[0].mul(share).add(at[0]), d[1].mul(share).add(at[1]), d[2].mul(share).add(at[2])];
                 if moved.is_none() {
-                    moved = Some(self.ends.clone());
+                    *moved = Some(self.ends.clone());
                 }
-                if let Some(ends) = &mut moved {
+                if let Some(ends) = moved {
                     ends.set_bundle::<I>(bundle, &to, left);
                 }
             }
         }
-        if let Some(ends) = &mut moved {
+        if let Some(ends) = moved {
             ends.join();
         }
-        (moved, free)
+        free
     }
 }
 

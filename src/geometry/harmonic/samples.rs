@@ -11,7 +11,7 @@
 //! ```
 
 use super::Bounds;
-use super::bounds::{hessian, sup};
+use super::bounds::sup;
 use super::lattice::Lattice;
 use super::regions::{Regions, Shape, Steepness, carried};
 use super::series::{Bend, Series};
@@ -25,7 +25,7 @@ const CELLS: usize = 48;
 const DEGREES: usize = 8;
 /// Times that, at most.
 const MOST: usize = 4;
-/// Points whose derivatives are found by one thread in one go.
+/// Rounds of points whose derivatives are found together.
 const TOGETHER: usize = 1024;
 /// What f32 rounds, and the expansion of an angle, of the largest numbers of their kind.
 const ROUNDING: f64 = 4e-7;
@@ -41,7 +41,7 @@ pub(super) struct Samples {
 }
 
 /// Value, gradient and covariant second derivatives in a direction.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Sample {
     value: f32,
     gradient: [f32; 3],
@@ -53,23 +53,13 @@ impl Samples {
     /// The samples of `series`.
     pub(super) fn new(series: &Series) -> Samples {
         let lattice = Lattice::new(CELLS * series.degree().div_ceil(DEGREES).clamp(1, MOST));
-        let bends = bends(series, &lattice);
-        let bounds = sup(series, &bends, lattice.reach());
-        let shapes: Vec<Shape> = bends.par_iter().map(|(n, bend)| Shape::new(*n, bend)).collect();
+        let (all, shapes) = known(series, &lattice);
+        let bounds = sup(series, &shapes, lattice.reach());
         let degree = series.degree();
         let whole = Steepness { first: bounds.first, second: bounds.second, third: degree as f64 * bounds.second };
         let regions = Regions::new(&lattice, &shapes, degree, whole);
         let bounds = Bounds { third: bounds.third.min(regions.third()), ..bounds };
-        let single = |x: f64| x as f32;
-        let sample = |(n, bend): &(DVec3, Bend)| {
-            let [x, y, z] = hessian(bend, *n).to_cols_array_2d();
-            Sample {
-                value: single(bend.value),
-                gradient: bend.slope(*n).gradient.to_array().map(single),
-                hessian: [x[0], y[1], z[2], y[2], x[2], x[1]].map(single),
-            }
-        };
-        Samples { all: bends.iter().map(sample).collect(), lattice, bounds, regions }
+        Samples { all, lattice, bounds, regions }
     }
 
     /// Bounds of the series and its derivatives.
@@ -107,7 +97,7 @@ impl Samples {
 
         let c = n.dot(d);
         let across = d - c * n;
-        let turned = across - across.dot(v) / (1.0 + n.dot(v)) * (v + n);
+        let turned = turned(n, v, across);
         let slope = (gradient + bent).dot(turned);
         let bend = turned.dot(hessian * turned);
         let sine_squared = 1.0 - c * c;
@@ -128,7 +118,7 @@ impl Samples {
         let slope = gradient + bent;
         Look {
             value: f64::from(sample.value) + w.dot(gradient + 0.5 * bent),
-            gradient: slope - slope.dot(n) / (1.0 + n.dot(v)) * (v + n),
+            gradient: turned(v, n, slope),
             hessian: carried(v, n, hessian),
             errors: self.errors(around, angle, 1.0),
             around,
@@ -153,9 +143,7 @@ impl Samples {
     /// A sample beside the direction `n`.
     fn beside(&self, n: DVec3) -> Near<'_> {
         let at = self.lattice.beside(n);
-        let (side, [face, u, v]) = (self.lattice.cells() + 1, at);
-        let around = self.regions.around(at, self.lattice.cells());
-        let sample = &self.all[(face * side + u) * side + v];
+        let (sample, around) = (&self.all[self.lattice.number(at)], self.regions.around(at));
         Near { sample, v: self.lattice.direction(self.lattice.on_face(at)), around }
     }
 }
@@ -179,20 +167,45 @@ pub(super) struct Look<'a> {
     pub(super) around: &'a Steepness,
 }
 
-/// The derivatives of `series` at the points of `lattice`, face by face, with their directions; those that can be are found together.
-fn bends(series: &Series, lattice: &Lattice) -> Vec<(DVec3, Bend)> {
-    let side = lattice.cells() + 1;
-    let point = |k: usize| lattice.on_face([k / (side * side), k / side % side, k % side]);
-    let mut order: Vec<usize> = (0..6 * side * side).collect();
-    order.par_sort_unstable_by_key(|&k| (lattice.round(point(k)), k));
-    let directions: Vec<DVec3> = order.par_iter().map(|&k| lattice.direction(point(k))).collect();
-    let all: Vec<Vec<Bend>> = directions.par_chunks(TOGETHER).map(|some| series.bends(some)).collect();
-    let mut bends: Vec<_> = order.into_iter().zip(directions.into_iter().zip(all.into_iter().flatten())).collect();
-    bends.par_sort_unstable_by_key(|(k, _)| *k);
-    bends.into_iter().map(|(_, of)| of).collect()
+/// What `series` is at the points of `lattice`, face by face.
+fn known(series: &Series, lattice: &Lattice) -> (Vec<Sample>, Vec<Shape>) {
+    let points = lattice.number([6, 0, 0]);
+    let (mut samples, mut shapes) = (vec![Sample::default(); points], vec![Shape::default(); points]);
+    let rounds: Vec<[usize; 3]> = lattice.rounds().collect();
+    let of_round = |&one: &[usize; 3]| {
+        let points = lattice.round(one);
+        let directions = points.map(|point| lattice.direction(point));
+        let bends = series.round(&directions);
+        let known = |i: usize| {
+            let shape = Shape::new(directions[i], &bends[i]);
+            (points[i], Sample::new(&bends[i], &shape), shape)
+        };
+        [0, 1, 2, 3, 4, 5, 6, 7].map(known)
+    };
+    // What is known of few at a time needs little memory, and that again and again.
+    for some in rounds.chunks(TOGETHER) {
+        let known: Vec<_> = some.par_iter().map(of_round).collect();
+        for (point, sample, shape) in known.iter().flatten() {
+            for at in lattice.faces(*point).map(|at| lattice.number(at)) {
+                (samples[at], shapes[at]) = (*sample, *shape);
+            }
+        }
+    }
+    (samples, shapes)
 }
 
 impl Sample {
+    /// Of a place with the derivatives `bend`, as `shape` has them on the sphere.
+    fn new(bend: &Bend, shape: &Shape) -> Sample {
+        let single = |x: f64| x as f32;
+        let [x, y, z] = shape.hessian.to_cols_array_2d();
+        Sample {
+            value: single(bend.value),
+            gradient: bend.slope(shape.direction).gradient.to_array().map(single),
+            hessian: [x[0], y[1], z[2], y[2], x[2], x[1]].map(single),
+        }
+    }
+
     fn derivatives(&self) -> (DVec3, DMat3) {
         let [xx, yy, zz, yz, xz, xy] = self.hessian.map(f64::from);
         let hessian = DMat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]);
@@ -200,8 +213,13 @@ impl Sample {
     }
 }
 
+/// What is `across` the direction `from`, turned with it to `to` along the great circle.
+pub(super) fn turned(from: DVec3, to: DVec3, across: DVec3) -> DVec3 {
+    across - across.dot(to) / (1.0 + from.dot(to)) * (from + to)
+}
+
 /// The way on the sphere from `v` to `n` near by, as long as the angle, and no less than that.
-fn way(v: DVec3, n: DVec3) -> (DVec3, f64) {
+pub(super) fn way(v: DVec3, n: DVec3) -> (DVec3, f64) {
     let w = n - n.dot(v) * v;
     let sine2 = w.length_squared();
     // The angle over its sine.

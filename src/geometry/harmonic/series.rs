@@ -44,6 +44,9 @@ pub struct Series {
 /// Orders that are summed side by side: two registers of AVX2, so that one waits less for the other, and sums stay in registers.
 const LANES: usize = 8;
 
+/// Directions that share what does not depend on x and y: as many as mirrors in x, y and x = y make of one.
+pub(super) const ROUND: usize = 8;
+
 /// Terms with the same k - m of neighbouring orders m; 0 beyond the degree of the series.
 #[derive(Clone, Debug, PartialEq)]
 struct Row {
@@ -166,25 +169,23 @@ impl Series {
 
     /// r in the direction of the unit vector `n`.
     pub fn value(&self, n: DVec3) -> f64 {
-        self.path.run(At::<0> { series: self, n }).value
+        self.path.run(At::<0, LANES> { series: self, n }).value
     }
 
     /// r and its gradient in the direction of the unit vector `n`.
     pub fn slope(&self, n: DVec3) -> Slope {
-        let bend = self.path.run(At::<1> { series: self, n });
+        let bend = self.path.run(At::<1, LANES> { series: self, n });
         Slope { value: bend.value, gradient: bend.g - bend.g.dot(n) * n }
     }
 
     /// r, g and the second derivatives in the direction of the unit vector `n`.
     pub fn bend(&self, n: DVec3) -> Bend {
-        self.path.run(At::<2> { series: self, n })
+        self.path.run(At::<2, { LANES / 2 }> { series: self, n })
     }
 
-    /// The same in each of `directions`: faster where some that follow each other have the same z and x^2 + y^2 to the last bit.
-    pub(super) fn bends(&self, directions: &[DVec3]) -> Vec<Bend> {
-        let alike = |a: &DVec3, b: &DVec3| a.z == b.z && a.x * a.x + a.y * a.y == b.x * b.x + b.y * b.y;
-        let rounds = directions.chunk_by(alike);
-        rounds.flat_map(|directions| self.path.run(Round { series: self, directions })).collect()
+    /// The same in each of some directions with the same z, and the same x^2 + y^2 to the last bit.
+    pub(super) fn round(&self, directions: &[DVec3; ROUND]) -> [Bend; ROUND] {
+        self.path.run(Round { series: self, directions })
     }
 
     /// The norm |c_k| of the coefficients of each degree: sqrt(sum over m of c^2 + s^2), which bounds that part of r everywhere.
@@ -215,135 +216,167 @@ fn groups(degree: usize, terms: &[Term]) -> Vec<Vec<Row>> {
     groups
 }
 
-/// A series in a direction, with as many derivatives as `DERIVATIVES`, the others 0. Lanes are summed by plain operations and joined
-/// order by order, so the bits are those of a loop over single terms, on any processor.
-struct At<'a, const DERIVATIVES: u32> {
+/// A series in a direction, with as many derivatives as `DERIVATIVES`, the others 0, so many lanes at once. Lanes are summed by plain operations
+/// and joined order by order, so the bits are those of a loop over single terms, on any processor.
+struct At<'a, const DERIVATIVES: u32, const WIDE: usize> {
     series: &'a Series,
     n: DVec3,
 }
 
-impl<const DERIVATIVES: u32> Kernel for At<'_, DERIVATIVES> {
+impl<const DERIVATIVES: u32, const WIDE: usize> Kernel for At<'_, DERIVATIVES, WIDE> {
     type Output = Bend;
 
     #[inline(always)]
     fn run<I: Isa>(self) -> Bend {
-        let mut sum = Sum::new(self.n);
+        let mut sum = Sum::new(&[self.n]);
         for (group, first) in self.series.groups.iter().zip((0..).step_by(LANES)) {
-            let of = sums::<DERIVATIVES>(group, self.n);
+            let of = sums::<DERIVATIVES, WIDE>(group, self.n);
             sum.add::<DERIVATIVES>(&of, first..=self.series.degree);
         }
-        sum.bend()
+        sum.bend(0)
     }
 }
 
-/// A series in directions with the same z, and the same x^2 + y^2 to the last bit, which share what does not depend on x and y.
+/// A series in directions with the same z, and the same x^2 + y^2 to the last bit, which share what does not depend on x and y, and
+/// are summed side by side.
 struct Round<'a> {
     series: &'a Series,
-    directions: &'a [DVec3],
+    directions: &'a [DVec3; ROUND],
 }
 
 impl Kernel for Round<'_> {
-    type Output = Vec<Bend>;
+    type Output = [Bend; ROUND];
 
     #[inline(always)]
-    fn run<I: Isa>(self) -> Vec<Bend> {
-        let mut all = Vec::with_capacity(self.directions.len());
-        for n in self.directions {
-            all.push(Sum::new(*n));
-        }
+    fn run<I: Isa>(self) -> [Bend; ROUND] {
+        let mut sum = Sum::new(self.directions);
         for (group, first) in self.series.groups.iter().zip((0..).step_by(LANES)) {
-            let of = sums::<2>(group, self.directions[0]);
-            for sum in &mut all {
-                sum.add::<2>(&of, first..=self.series.degree);
-            }
+            let of = sums::<2, { LANES / 2 }>(group, self.directions[0]);
+            sum.add::<2>(&of, first..=self.series.degree);
         }
-        all.iter().map(Sum::bend).collect()
+        let mut bends = [sum.bend(0); ROUND];
+        for i in 1..ROUND {
+            bends[i] = sum.bend(i);
+        }
+        bends
     }
 }
 
-/// The sum of orders in a direction.
-struct Sum {
-    n: DVec3,
-    value: f64,
-    g: DVec3,
+/// The sums of orders in so many directions.
+struct Sum<const MANY: usize> {
+    x: [f64; MANY],
+    y: [f64; MANY],
+    value: [f64; MANY],
+    g: [[f64; MANY]; 3],
     /// xx, xy, xz, yz, zz.
-    second: [f64; 5],
+    second: [[f64; MANY]; 5],
     /// (x + i y)^m, and the same with m - 1 and m - 2.
-    powers: [[f64; 2]; 3],
+    powers: [[[f64; MANY]; 2]; 3],
 }
 
-impl Sum {
+impl<const MANY: usize> Sum<MANY> {
     #[inline(always)]
-    fn new(n: DVec3) -> Sum {
-        Sum { n, value: 0.0, g: DVec3::ZERO, second: [0.0; 5], powers: [[1.0, 0.0], [0.0; 2], [0.0; 2]] }
+    fn new(directions: &[DVec3; MANY]) -> Self {
+        let zero = [0.0; MANY];
+        let (mut x, mut y) = (zero, zero);
+        for i in 0..MANY {
+            (x[i], y[i]) = (directions[i].x, directions[i].y);
+        }
+        let powers = [[[1.0; MANY], zero], [zero; 2], [zero; 2]];
+        Sum { x, y, value: zero, g: [zero; 3], second: [zero; 5], powers }
     }
 
     /// Adds the orders of a group, as far as there are any.
     #[inline(always)]
     fn add<const DERIVATIVES: u32>(&mut self, of: &[[f64; LANES]; 6], orders: RangeInclusive<usize>) {
-        let Sum { n, value, g, second: [xx, xy, xz, yz, zz], powers: [power, before, second] } = self;
+        let Sum { x, y, value, g: [gx, gy, gz], second: [xx, xy, xz, yz, zz], powers } = self;
         for (lane, m) in (0..LANES).zip(orders) {
             let [a, b, da, db, dda, ddb] =
                 [of[0][lane], of[1][lane], of[2][lane], of[3][lane], of[4][lane], of[5][lane]];
             let order = m as f64;
-            *value += a * power[0] + b * power[1];
+            let [[c, d], [c1, d1], [c2, d2]] = *powers;
+            for i in 0..MANY {
+                value[i] += a * c[i] + b * d[i];
+            }
             if DERIVATIVES >= 1 {
-                g.x += order * (a * before[0] + b * before[1]);
-                g.y += order * (b * before[0] - a * before[1]);
-                g.z += da * power[0] + db * power[1];
+                for i in 0..MANY {
+                    gx[i] += order * (a * c1[i] + b * d1[i]);
+                    gy[i] += order * (b * c1[i] - a * d1[i]);
+                    gz[i] += da * c[i] + db * d[i];
+                }
             }
             if DERIVATIVES >= 2 {
                 let pairs = order * (order - 1.0);
-                *xx += pairs * (a * second[0] + b * second[1]);
-                *xy += pairs * (b * second[0] - a * second[1]);
-                *xz += order * (da * before[0] + db * before[1]);
-                *yz += order * (db * before[0] - da * before[1]);
-                *zz += dda * power[0] + ddb * power[1];
+                for i in 0..MANY {
+                    xx[i] += pairs * (a * c2[i] + b * d2[i]);
+                    xy[i] += pairs * (b * c2[i] - a * d2[i]);
+                    xz[i] += order * (da * c1[i] + db * d1[i]);
+                    yz[i] += order * (db * c1[i] - da * d1[i]);
+                    zz[i] += dda * c[i] + ddb * d[i];
+                }
             }
-            (*second, *before) = (*before, *power);
-            *power = [power[0] * n.x - power[1] * n.y, power[0] * n.y + power[1] * n.x];
+            (powers[2], powers[1]) = ([c1, d1], [c, d]);
+            for i in 0..MANY {
+                (powers[0][0][i], powers[0][1][i]) = (c[i] * x[i] - d[i] * y[i], c[i] * y[i] + d[i] * x[i]);
+            }
         }
     }
 
+    /// What they come to in direction `i`.
     #[inline(always)]
-    fn bend(&self) -> Bend {
-        let [xx, xy, xz, yz, zz] = self.second;
+    fn bend(&self, i: usize) -> Bend {
+        let [xx, xy, xz, yz, zz] =
+            [self.second[0][i], self.second[1][i], self.second[2][i], self.second[3][i], self.second[4][i]];
         // The powers are harmonic in x and y.
         let hessian = DMat3::from_cols_array(&[xx, xy, xz, xy, -xx, yz, xz, yz, zz]);
-        Bend { value: self.value, g: self.g, hessian }
+        Bend { value: self.value[i], g: DVec3::new(self.g[0][i], self.g[1][i], self.g[2][i]), hessian }
     }
 }
 
-/// A_m, B_m and their first and second derivatives by z of the orders of a group.
+/// A_m, B_m and their first and second derivatives by z of the orders of a group, so many at once: what is more than registers hold costs several
+/// times as much.
 #[inline(always)]
-fn sums<const DERIVATIVES: u32>(group: &[Row], n: DVec3) -> [[f64; LANES]; 6] {
+fn sums<const DERIVATIVES: u32, const WIDE: usize>(group: &[Row], n: DVec3) -> [[f64; LANES]; 6] {
     let across2 = n.x * n.x + n.y * n.y;
-    let zero = [0.0; LANES];
-    let [mut a, mut b, mut da, mut db, mut dda, mut ddb] = [zero; 6];
-    // H and its derivatives of the last step, and of the one before.
-    let [mut h, mut h0, mut dh, mut dh0, mut ddh, mut ddh0] = [zero; 6];
-    for (step, row) in group.iter().enumerate() {
-        for i in 0..LANES {
-            let (ahead, behind) = (row.ahead[i], row.behind[i]);
-            let (cosine, sine) = (row.cosine[i], row.sine[i]);
-            if DERIVATIVES >= 2 {
-                let next = if step == 0 { 0.0 } else { ahead * (2.0 * dh[i] + n.z * ddh[i]) - behind * ddh0[i] };
-                (ddh0[i], ddh[i]) = (ddh[i], next);
-                dda[i] += cosine * next;
-                ddb[i] += sine * next;
+    let mut all = [[0.0; LANES]; 6];
+    for first in (0..LANES).step_by(WIDE) {
+        let zero = [0.0; WIDE];
+        let [mut a, mut b, mut da, mut db, mut dda, mut ddb] = [zero; 6];
+        // H and its derivatives of the last step, and of the one before.
+        let [mut h, mut h0, mut dh, mut dh0, mut ddh, mut ddh0] = [zero; 6];
+        for i in 0..WIDE {
+            let row = &group[0];
+            h[i] = row.ahead[first + i];
+            (a[i], b[i]) = (row.cosine[first + i] * h[i], row.sine[first + i] * h[i]);
+        }
+        // The first of these orders has fewer terms than that of the group.
+        let terms = group.len().saturating_sub(first).max(1);
+        for row in &group[1..terms] {
+            for i in 0..WIDE {
+                let (ahead, behind) = (row.ahead[first + i], row.behind[first + i]);
+                let (cosine, sine) = (row.cosine[first + i], row.sine[first + i]);
+                if DERIVATIVES >= 2 {
+                    let next = ahead * (2.0 * dh[i] + n.z * ddh[i]) - behind * ddh0[i];
+                    (ddh0[i], ddh[i]) = (ddh[i], next);
+                    dda[i] += cosine * next;
+                    ddb[i] += sine * next;
+                }
+                if DERIVATIVES >= 1 {
+                    let next = ahead * (h[i] + n.z * dh[i]) - behind * dh0[i];
+                    (dh0[i], dh[i]) = (dh[i], next);
+                    da[i] += cosine * next;
+                    db[i] += sine * next;
+                }
+                let next = n.z * (ahead * h[i] - behind * (n.z * h0[i])) - behind * (across2 * h0[i]);
+                (h0[i], h[i]) = (h[i], next);
+                a[i] += cosine * next;
+                b[i] += sine * next;
             }
-            if DERIVATIVES >= 1 {
-                let next = if step == 0 { 0.0 } else { ahead * (h[i] + n.z * dh[i]) - behind * dh0[i] };
-                (dh0[i], dh[i]) = (dh[i], next);
-                da[i] += cosine * next;
-                db[i] += sine * next;
-            }
-            let next = n.z * (ahead * h[i] - behind * (n.z * h0[i])) - behind * (across2 * h0[i]);
-            let next = if step == 0 { ahead } else { next };
-            (h0[i], h[i]) = (h[i], next);
-            a[i] += cosine * next;
-            b[i] += sine * next;
+        }
+        let of = [a, b, da, db, dda, ddb];
+        for k in 0..6 {
+            all[k][first..first + WIDE].copy_from_slice(&of[k]);
         }
     }
-    [a, b, da, db, dda, ddb]
+    all
 }

@@ -13,8 +13,10 @@ use super::lattice::Lattice;
 use crate::math::DVec3;
 use rayon::prelude::*;
 
-/// Samples along an edge of the cube.
+/// Samples along an edge of the cube, at most.
 const SAMPLES: usize = 384;
+/// Samples along an edge of a triangle, at most: beyond, triangles are coarser than what lies between samples.
+const PARTS: usize = 16;
 
 /// Corners of triangles inside and outside of a surface, in its own coordinates.
 pub(super) struct Shells {
@@ -35,8 +37,10 @@ impl Shells {
         let corners: Vec<DVec3> =
             points.iter().map(|&p| lattice.direction(p)).map(|n| star.series.value(n) * n).collect();
         let triangles: Vec<[usize; 3]> = triangles(&lattice).map(|t| t.map(number)).collect();
-        let bounds: Vec<(f64, f64)> =
-            triangles.par_iter().map(|t| quotients(star, &t.map(|i| corners[i]), SAMPLES / cells)).collect();
+        let bounds: Vec<(f64, f64)> = triangles
+            .par_iter()
+            .map(|t| quotients(star, &t.map(|i| corners[i]), (SAMPLES / cells).min(PARTS)))
+            .collect();
         let mut factors = vec![(f64::INFINITY, 0f64); corners.len()];
         for (triangle, &(low, high)) in triangles.iter().zip(&bounds) {
             for &i in triangle {
@@ -56,7 +60,7 @@ impl Shells {
 }
 
 /// Two triangles for each cell of the faces of the cube, their fronts outward.
-fn triangles(lattice: &Lattice) -> impl Iterator<Item = [[usize; 3]; 3]> {
+pub(super) fn triangles(lattice: &Lattice) -> impl Iterator<Item = [[usize; 3]; 3]> {
     let n = lattice.cells();
     (0..6).flat_map(move |face| {
         let cells = (0..n).flat_map(move |u| (0..n).map(move |v| (u, v)));

@@ -26,6 +26,13 @@ impl Taylor {
         }
     }
 
+    /// The zero of value + first s + second s^2/2 that the tangent of a falling function leads to, ahead or behind; where there is none, twice as far
+    /// as that of the tangent.
+    pub(super) fn root(&self) -> f64 {
+        let turns = self.first * self.first - 2.0 * self.second * self.value;
+        2.0 * self.value / (turns.max(0.0).sqrt() - self.first)
+    }
+
     /// value + first s + second s^2/2 - third s^3/6: the least that the function can be at s.
     fn least(&self, s: f64, third: f64) -> f64 {
         self.value + s * (self.first + s * (0.5 * self.second - s * third / 6.0))

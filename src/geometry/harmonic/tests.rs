@@ -1,7 +1,11 @@
 //! What is certain without the series is what the series says: samples and their errors, bounds, what is clear.
 
+use super::lattice::Lattice;
+use super::outline::Sort;
 use super::roots::Wave;
 use super::{Harmonic, Series, Star};
+use crate::geometry::simd::Path;
+use crate::geometry::visibility::{BUNDLE, BUNDLES, Points, TILE};
 use crate::geometry::{Geometry, Mesh, Ray};
 use crate::math::{DMat3, DVec3, sin_cos};
 use crate::random::{Domain, Generator, Stream, sphere};
@@ -74,9 +78,28 @@ fn directions_that_share_what_depends_on_z_have_the_bits_of_each_alone() {
     for degree in [0, 3, 21] {
         let series = rough(degree, &mut rng);
         let n = sphere(rng.uniform2());
-        let round = [n, DVec3::new(-n.x, n.y, n.z), DVec3::new(n.y, -n.x, n.z), sphere(rng.uniform2())];
-        let bends = series.bends(&round);
+        let quarter = |n: DVec3| [n, -n, DVec3::new(-n.x, n.y, n.z), DVec3::new(n.x, -n.y, n.z)].map(|m| m.with_z(n.z));
+        let round: [DVec3; 8] = [quarter(n), quarter(DVec3::new(n.y, n.x, n.z))].concat().try_into().unwrap();
+        let bends = series.round(&round);
         assert!(bends.iter().zip(round).all(|(bend, n)| *bend == series.bend(n)), "degree {degree}");
+    }
+}
+
+#[test]
+fn rounds_are_all_points_of_a_lattice() {
+    for cells in [1, 2, 5, 8] {
+        let lattice = Lattice::new(cells);
+        let mut all: Vec<[usize; 3]> = lattice.rounds().flat_map(|one| lattice.round(one)).collect();
+        all.sort_unstable();
+        all.dedup();
+        assert!(all.iter().copied().eq(lattice.points()), "{cells}");
+        let faces: Vec<[usize; 3]> = all.iter().flat_map(|&point| lattice.faces(point)).collect();
+        assert!(faces.len() == lattice.number([6, 0, 0]), "{cells}");
+        for one in lattice.rounds() {
+            let like = |n: DVec3| (n.z, n.x * n.x + n.y * n.y);
+            assert!(lattice.round(one).iter().all(|&p| like(lattice.direction(p)) == like(lattice.direction(one))));
+            assert!(lattice.faces(one).all(|face| lattice.on_face(face) == one));
+        }
     }
 }
 
@@ -184,5 +207,50 @@ fn exact_roots_from_within_lead_out() {
         let crossing = star.first_crossing(o, d, 6.0).unwrap();
         let root = Wave::new(&star.series, o, d, -1.0).first(0.0, 6.0).unwrap();
         assert!((root - crossing.distance).abs() < 1e-9, "{root} {}", crossing.distance);
+    }
+}
+
+#[test]
+fn an_outline_tells_of_nearly_all_points_and_never_wrongly() {
+    let mut rng = generator("outlines");
+    for degree in [0, 8, 24] {
+        let star = Star::new(rough(degree, &mut rng)).unwrap();
+        let turned = DMat3::from_cols(DVec3::new(0.6, 0.8, 0.0), DVec3::new(0.8, -0.6, 0.0), DVec3::Z * 1.3) * 0.3;
+        let object = Harmonic::new(star, DVec3::new(0.2, 0.1, -0.4), turned).unwrap();
+        let corners = DVec3::splat(30.0);
+        let object = object.shelled((-corners, corners));
+        let (center, radius, _) = object.around();
+        let (mut known, mut missed, mut met, mut all) = (0, 0, 0, 0);
+        for _ in 0..60 {
+            // From just outside to a hundred radii away; points on a disc beyond the object, and anywhere around.
+            let apex = center
+                + sphere(rng.uniform2()) * radius * (1.02 + 50.0 * rng.uniform() * rng.uniform() * rng.uniform());
+            let point = |k: usize, rng: &mut Generator| match k % 2 {
+                0 => 2.0 * center - apex + 4.0 * radius * sphere(rng.uniform2()),
+                _ => center + 3.0 * radius * rng.uniform() * sphere(rng.uniform2()),
+            };
+            let apex = apex.as_vec3();
+            let points: Vec<_> = (0..TILE).map(|k| point(k, &mut rng).as_vec3()).collect();
+            let outline = object.outline(apex).unwrap();
+            let tile = Points::new(&Geometry::default(), &points);
+            let sort = || Sort { outline: &outline, apex, ends: &tile.ends, asked: &[u16::MAX; BUNDLES] };
+            let sorted = Path::Scalar.run(sort());
+            for path in Path::ALL.into_iter().filter(|path| path.is_available()) {
+                assert_eq!(path.run(sort()), sorted, "{path:?}");
+            }
+            for (k, p) in points.iter().enumerate().filter(|(_, p)| !object.contains(p.as_dvec3())) {
+                let way = (p - apex).as_dvec3();
+                let ray = Ray { origin: apex.as_dvec3(), direction: way.normalize() };
+                let is_met = object.first_crossing(&ray).is_some_and(|at| at < way.length());
+                let [free, blocked] = [&sorted.0, &sorted.1].map(|lanes| lanes[k / BUNDLE] >> (k % BUNDLE) & 1 == 1);
+                assert!(if is_met { !free } else { !blocked }, "{apex} {p}: {free} {blocked} {is_met}");
+                (all, known) = (all + 1, known + usize::from(free || blocked));
+                (missed, met) = (missed + usize::from(free), met + usize::from(blocked));
+            }
+        }
+        assert!(
+            10 * known > 8 * all && 20 * missed > all && 20 * met > all,
+            "degree {degree}: {missed} {met} of {all}"
+        );
     }
 }

@@ -1,0 +1,258 @@
+//! The outline of a star-shaped object seen from a point outside.
+//!
+//! Rays from the apex a in half a plane that ends at the line from a through the centre cross the object up to some angle with that line, none
+//! beyond: a crossing at y means that all of the way from the centre to y is inside. So with z the coordinate of D = p - a towards the centre, x and y
+//! those across, and w = z/(|x| + |y|), for each wedge around the line
+//!
+//! ```text
+//! w < w_o  or  z <= z_n:  the segment from a to p is free,      w_o: the least w of the outer net of the cage in the wedge
+//! w > w_i and z > z_f:    it is blocked,                        w_i: the greatest w of edges of the inner net, around all of the line
+//! ```
+//!
+//! z_n is that of the nearest point of the object, z_f the farthest of the centre and these edges: a ray below an edge crosses the way
+//! from the centre there. The edges are those of the rim. Whatever goes around the line in the inner net would do, between the triangles where
+//! the line enters it and leaves.
+//!
+//! The share q = |y|/(|x| + |y|) tells the direction within a quadrant, and along a straight edge w is linear in q: both are quotients of
+//! linear functions with the same denominator.
+
+use super::cage::{Cage, Corner};
+use crate::geometry::points::Ends;
+use crate::geometry::simd::{Isa, Kernel, Vector};
+use crate::geometry::visibility::{BUNDLE, BUNDLES, Lanes};
+use crate::math::{DVec3, Vec3, frame};
+use std::sync::OnceLock;
+
+/// Wedges around the line.
+const WEDGES: usize = 128;
+/// Those of a quadrant.
+const QUADRANT: f32 = (WEDGES / 4) as f32;
+/// What is taken off w for rounding: of itself, and of that in units of its least.
+const ROUNDING: [f64; 2] = [1e-5, 1e-6];
+/// What is added to wedges for rounding, in units of them.
+const ASIDE: f32 = 0.02;
+/// The least distance from the centre to the surface, seen from the apex, that f32 leaves alone.
+const LEAST: f64 = 1e-3;
+
+/// The outline from an apex, from when it is first asked for.
+pub(in crate::geometry) type Prospect = OnceLock<Option<Box<Outline>>>;
+
+/// The outline.
+#[derive(Clone, Debug)]
+pub(in crate::geometry) struct Outline {
+    /// Unit vectors across the line, and along it towards the centre.
+    axes: [Vec3; 3],
+    /// w_o and w_i of each wedge.
+    bounds: [[f32; 2]; WEDGES],
+    /// z_n and z_f \[m\].
+    near: f32,
+    far: f32,
+}
+
+/// What an outline is made of: w_o and w_i so far of the lines that cross the beginning of each wedge, and of the ends of lines within it.
+struct Draft {
+    axes: [Vec3; 3],
+    distance: f32,
+    far: f32,
+    borders: [[f32; 2]; WEDGES],
+    ends: [[f32; 2]; WEDGES],
+}
+
+/// Coordinates across the line, and along it in the outer net and in the inner one.
+type Place = [f32; 4];
+
+/// Which way a place lies from the line, 0 to 4 for a whole turn, and w in both nets; in the inner one 0 where that does not count.
+#[derive(Clone, Copy)]
+struct Bearing {
+    turn: f32,
+    w: [f32; 2],
+}
+
+impl Outline {
+    /// That of what `cage` holds, all between the distances `low` and `high` from its centre, from the point `apex`, seen from there \[m\]; `None` from too
+    /// near, or too far for f32.
+    pub(super) fn new(cage: &Cage, (low, high): (f64, f64), apex: DVec3) -> Option<Outline> {
+        let distance = apex.length();
+        if distance <= 1.01 * high || low < LEAST * distance {
+            return None;
+        }
+        let towards = -apex / distance;
+        let (e, f) = frame(towards);
+        let axes = [e, f, towards].map(|v| v.as_vec3());
+        let none = [[f32::INFINITY, 0.0]; WEDGES];
+        let mut draft = Draft { axes, distance: distance as f32, far: distance as f32, borders: none, ends: none };
+        cage.rim(apex.as_vec3(), |ends, is_rim| draft.include(ends, is_rim));
+        let off = (ROUNDING[0] + ROUNDING[1] * distance / low) as f32;
+        let near = ((distance - high) * (1.0 - ROUNDING[0])) as f32;
+        Some(Outline { axes, bounds: draft.bounds(off), near, far: draft.far * (1.0 + off) })
+    }
+}
+
+impl Draft {
+    /// Takes in an edge of the outer net, and where it is part of the rim, that of the inner one.
+    #[inline(always)]
+    fn include(&mut self, ends: [&Corner; 2], is_rim: bool) {
+        let [a, b] = ends.map(|end| {
+            let [x, y, z] = self.axes.map(|axis| axis.dot(end.outer));
+            // The inner corner is in the same direction from the centre, nearer to it: these are that many times its coordinates.
+            let inner = if is_rim { z + self.distance * end.ratio } else { 0.0 };
+            [x, y, z + self.distance, inner]
+        });
+        if is_rim {
+            self.far = self.far.max(a[3] / ends[0].ratio).max(b[3] / ends[1].ratio);
+        }
+        let crossing = |k: usize| if (a[k] < 0.0) != (b[k] < 0.0) { a[k] / (a[k] - b[k]) } else { 2.0 };
+        let shares = [crossing(0), crossing(1)];
+        let mut from = bearing(a);
+        self.end(from);
+        if shares != [2.0; 2] {
+            let order = if shares[0] <= shares[1] { [0, 1] } else { [1, 0] };
+            for k in order.into_iter().filter(|&k| shares[k] <= 1.0) {
+                let axis = on_axis(a, b, k, shares[k]);
+                self.spread(from, axis);
+                self.end(axis);
+                from = axis;
+            }
+        }
+        let to = bearing(b);
+        self.spread(from, to);
+        self.end(to);
+    }
+
+    /// Takes in the end of a line, in both wedges where it is at the border of two.
+    #[inline(always)]
+    fn end(&mut self, at: Bearing) {
+        // A turn more: what is positive is rounded down by a mere conversion.
+        let turn = at.turn * QUADRANT + WEDGES as f32;
+        for k in [turn - ASIDE, turn + ASIDE] {
+            widen(&mut self.ends[k as usize % WEDGES], at.w);
+        }
+    }
+
+    /// Takes in what lies between two places in a quadrant, where wedges begin.
+    #[inline(always)]
+    fn spread(&mut self, a: Bearing, b: Bearing) {
+        let (mut a, mut b) = if a.turn <= b.turn { (a, b) } else { (b, a) };
+        if b.turn - a.turn > 1.5 {
+            // The beginning of a turn is the end of one.
+            (a, b) = (b, Bearing { turn: a.turn + 4.0, w: a.w });
+        }
+        let (first, last) = ((a.turn * QUADRANT) as usize + 1, (b.turn * QUADRANT) as usize);
+        if first > last {
+            return;
+        }
+        let inverse = 1.0 / ((b.turn - a.turn) * QUADRANT);
+        let slopes = [0, 1].map(|k| (b.w[k] - a.w[k]) * inverse);
+        for k in first..=last {
+            let way = k as f32 - a.turn * QUADRANT;
+            widen(&mut self.borders[k % WEDGES], [0, 1].map(|i| a.w[i] + slopes[i] * way));
+        }
+    }
+
+    /// w_o and w_i of all wedges, widened by the share `off`.
+    fn bounds(&self, off: f32) -> [[f32; 2]; WEDGES] {
+        let mut bounds = self.ends;
+        for (k, bounds) in bounds.iter_mut().enumerate() {
+            widen(bounds, self.borders[k]);
+            widen(bounds, self.borders[(k + 1) % WEDGES]);
+            // Where nothing goes around, nothing is known.
+            let inner = if bounds[1] > 0.0 { bounds[1] * (1.0 + off) } else { f32::INFINITY };
+            *bounds = [bounds[0] * (1.0 - off), inner];
+        }
+        bounds
+    }
+}
+
+/// Takes w in an outer and an inner line into the least of the first and the greatest of the second.
+#[inline(always)]
+fn widen(bounds: &mut [f32; 2], [outer, inner]: [f32; 2]) {
+    bounds[0] = if outer < bounds[0] { outer } else { bounds[0] };
+    bounds[1] = if inner > bounds[1] { inner } else { bounds[1] };
+}
+
+/// Where the line from `a` to `b` crosses that with x = 0, or y = 0 where `k` is 1, which it does after this `share` of it.
+fn on_axis(a: Place, b: Place, k: usize, share: f32) -> Bearing {
+    let mut at = [0.0; 4];
+    for i in 0..4 {
+        at[i] = a[i] + share * (b[i] - a[i]);
+    }
+    let other = at[1 - k];
+    let turn = if k == 0 {
+        if other < 0.0 { 3.0 } else { 1.0 }
+    } else if other < 0.0 {
+        2.0
+    } else {
+        0.0
+    };
+    let inverse = 1.0 / other.abs().max(f32::MIN_POSITIVE);
+    Bearing { turn, w: [at[2] * inverse, at[3] * inverse] }
+}
+
+#[inline(always)]
+fn bearing([x, y, outer, inner]: Place) -> Bearing {
+    let inverse = 1.0 / (x.abs() + y.abs()).max(f32::MIN_POSITIVE);
+    let share = y.abs() * inverse;
+    let (sign, start) = match (x < 0.0, y < 0.0) {
+        (false, false) => (1.0, 0.0),
+        (true, false) => (-1.0, 2.0),
+        (true, true) => (1.0, 2.0),
+        (false, true) => (-1.0, 4.0),
+    };
+    Bearing { turn: start + sign * share, w: [outer * inverse, inner * inverse] }
+}
+
+/// The points `asked` whose segments from `apex` are certainly free, and those whose are certainly blocked.
+pub(super) struct Sort<'a> {
+    pub(super) outline: &'a Outline,
+    pub(super) apex: Vec3,
+    pub(super) ends: &'a Ends,
+    pub(super) asked: &'a Lanes,
+}
+
+impl Kernel for Sort<'_> {
+    type Output = (Lanes, Lanes);
+
+    #[inline(always)]
+    fn run<I: Isa>(self) -> (Lanes, Lanes) {
+        let Sort { outline, apex, ends, asked } = self;
+        let (mut free, mut blocked) = ([0; BUNDLES], [0; BUNDLES]);
+        let zero = I::Sixteen::splat(0.0);
+        let [e, f, towards] = outline.axes;
+        let (near, far) = (I::Sixteen::splat(outline.near), I::Sixteen::splat(outline.far));
+        let mut wedges = [0.0; BUNDLE];
+        let mut bounds = [[0.0; BUNDLE]; 2];
+        for bundle in 0..BUNDLES {
+            if asked[bundle] == 0 {
+                continue;
+            }
+            let d = ends.segments::<I>(bundle, apex.to_array());
+            let (x, y, z) = (along::<I>(&d, e), along::<I>(&d, f), along::<I>(&d, towards));
+            let (width, height) = (x.abs(), y.abs());
+            let across = width.add(height);
+            let share = height.div(across.max(I::Sixteen::splat(f32::MIN_POSITIVE)));
+            // As `bearing`: 0, 2 - 2 share, 2 and 4 - 2 share more, each with its quadrant.
+            let (left, low) = (x.less(zero), y.less(zero));
+            let back = I::Sixteen::splat(QUADRANT).mul(share);
+            let mirrored = I::Sixteen::splat(-1.0).mul(back);
+            let whole = I::Sixteen::splat(2.0 * QUADRANT);
+            let start = whole.select(left).add(whole.add(whole).select(low & !left));
+            let turned = (left ^ low) & 0xFFFF;
+            start.add(back.select(!turned)).add(mirrored.select(turned)).store(&mut wedges);
+            for lane in 0..BUNDLE {
+                let [outer, inner] = outline.bounds[wedges[lane] as usize % WEDGES];
+                (bounds[0][lane], bounds[1][lane]) = (outer, inner);
+            }
+            let outside = z.less(I::Sixteen::load(&bounds[0]).mul(across));
+            let inside = I::Sixteen::load(&bounds[1]).mul(across).less(z);
+            free[bundle] = asked[bundle] & (outside | z.less(near)) as u16;
+            blocked[bundle] = asked[bundle] & !free[bundle] & (inside & far.less(z)) as u16;
+        }
+        (free, blocked)
+    }
+}
+
+#[inline(always)]
+fn along<I: Isa>(d: &[I::Sixteen; 3], axis: Vec3) -> I::Sixteen {
+    let [x, y, z] = [d[0], d[1], d[2]];
+    x.mul(I::Sixteen::splat(axis.x)).add(y.mul(I::Sixteen::splat(axis.y))).add(z.mul(I::Sixteen::splat(axis.z)))
+}
