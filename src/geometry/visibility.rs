@@ -67,6 +67,7 @@ impl Geometry {
         for (sphere, inside) in self.spheres.iter().zip(&points.inside) {
             shadow_of_sphere(sphere, apex.at, points, inside, seen);
         }
+        debug_assert_eq!(self.harmonics.len(), apex.prospects.len(), "an apex of this geometry");
         let harmonics = self.harmonics.iter().zip(&apex.prospects);
         for ((harmonic, prospect), beside) in harmonics.zip(&points.beside) {
             harmonic.hide((apex.at, prospect), points, beside, seen, scratch);

@@ -77,10 +77,13 @@ fn tiles_beyond_beside_and_before_an_object_are_seen_as_by_the_series_alone() {
     let (mut geometry, object) = room(objects::rough(16, &mut generator("rough")));
     let mut rng = generator("tiles");
     let mut hidden_of = [0; 3];
-    for _ in 0..60 {
+    for tile in 0..60 {
         // Tiles in a plane far and near, of which some lie in the shadow and some along its edge.
-        let mut outside = || DVec3::new(0.3, -0.2, 0.4) + sphere(rng.uniform2()) * (1.7 + 1.5 * rng.uniform());
-        let (apex, middle) = (outside().as_vec3(), outside());
+        let center = DVec3::new(0.3, -0.2, 0.4);
+        let mut outside = || sphere(rng.uniform2()) * (1.7 + 1.5 * rng.uniform());
+        let (apex, elsewhere) = (outside(), outside());
+        let middle = center + if tile % 2 == 0 { elsewhere } else { 0.4 * elsewhere - apex };
+        let apex = (center + apex).as_vec3();
         let (e, f) = lampyris::math::frame(sphere(rng.uniform2()));
         let size = 0.02 + 0.6 * rng.uniform();
         let mut point = || middle + size * ((rng.uniform() - 0.5) * e + (rng.uniform() - 0.5) * f);

@@ -43,7 +43,7 @@ impl TileBeside {
     pub(in crate::geometry) fn new(object: &Harmonic, points: &[Vec3]) -> Self {
         let mut tile = TileBeside { inside: [0; BUNDLES], near: [0; BUNDLES], rises: None };
         for (i, &point) in points.iter().enumerate() {
-            let Beside { inside, near, rise, .. } = object.beside(point.as_dvec3());
+            let Beside { inside, near, rise } = object.beside(point.as_dvec3());
             if !(inside || near) {
                 continue;
             }

@@ -57,7 +57,7 @@ impl Harmonic {
         seen: &mut Lanes,
         scratch: &mut Scratch,
     ) {
-        if self.is_apart(apex, points, beside) {
+        if *seen == [0; BUNDLES] || self.is_apart(apex, points, beside) {
             return;
         }
         let here = self.beside(apex.as_dvec3());
@@ -123,7 +123,7 @@ impl Harmonic {
         Outline::new(cage, (low, high), apex.as_dvec3() - center).map(Box::new)
     }
 
-    /// The same for an `apex` that may be within the outer meshes, where it is `here`.
+    /// The same for an `apex` that may be within the outer mesh, where it is `here`.
     fn hide_beside(&self, here: &Beside, tile: &Tile, shells: &Shelled, seen: &mut Lanes, scratch: &mut Scratch) {
         let (fine, apex) = (&shells.fine, tile.apex);
         let (shares, above) = shares(fine.outer.path, here, apex, tile.ends, seen);

@@ -8,6 +8,7 @@ use super::shells::{Shells, triangles};
 use crate::math::{DMat3, Vec3};
 use std::collections::BTreeMap;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Cells of the nets along an edge of the cube.
 pub(super) const CELLS: usize = 12;
@@ -15,8 +16,8 @@ pub(super) const CELLS: usize = 12;
 const TOGETHER: usize = 8;
 /// Patches of a net.
 const PATCHES: usize = 12 * CELLS * CELLS / TOGETHER;
-/// Patches beside one, at most, across whose borders its edges are.
-const BESIDE: usize = 6;
+/// Patches that the edges of one lie in, at most, itself among them.
+const BESIDE: usize = 5;
 /// What f32 rounds of how a triangle faces, in units of the distance.
 const ROUNDING: f32 = 4e-6;
 
@@ -32,6 +33,10 @@ pub(super) struct Corner {
 /// The nets.
 #[derive(Debug)]
 pub(super) struct Cage {
+    /// No corner of the outer net is farther from the centre \[m\].
+    pub(super) reach: f64,
+    /// As many as there are outlines of it.
+    pub(super) outlines: Arc<()>,
     corners: Vec<Corner>,
     /// Unit normals of the outer triangles, and the distances of their planes from the centre.
     planes: [Vec<f32>; 4],
@@ -96,7 +101,8 @@ impl Cage {
             assert!(of.len() <= BESIDE, "a patch with edges to {}", of.len());
             patches.push(Patch { edges: start..start + edges.len(), of: all });
         }
-        Cage { corners, planes, edges, patches }
+        let reach = corners.iter().map(|corner| f64::from(corner.outer.length())).fold(0.0, f64::max) * (1.0 + 1e-6);
+        Cage { reach, outlines: Arc::new(()), corners, planes, edges, patches }
     }
 
     /// Calls `f` with the ends of each edge that may be part of the rim, seen from `apex` \[m\] from the centre, and whether it is, for what goes around
@@ -131,7 +137,8 @@ impl Cage {
 
     /// Memory \[bytes\].
     pub(super) fn bytes(&self) -> u64 {
-        (size_of_val(&self.corners[..]) + size_of_val(&self.edges[..]) + 4 * size_of_val(&self.planes[0][..])) as u64
+        let edges = size_of_val(&self.edges[..]) + size_of_val(&self.patches[..]);
+        (size_of_val(&self.corners[..]) + edges + 4 * size_of_val(&self.planes[0][..])) as u64
     }
 }
 

@@ -3,7 +3,7 @@
 //! From a place on the line with value, slope and second derivative of F to the zero of the parabola that they make, s away, F is off by
 //! |F'''| s^3/6 at most, and what is left of the way by that over the slope. The samples lead to where that counts less than their own
 //! errors. There one sum of the series with its second derivatives is mostly enough: the parabola leads on to rounding, and the radius and
-//! the gradient follow from those derivatives at the angle a <= s/|x| from there,
+//! the gradient follow from those derivatives at the angle a, sin a <= s/|x|, from there,
 //!
 //! ```text
 //! |r      - (r + (g,w) + w'Hw/2)|  <=  M3 a^3/6                w the way on the sphere, of length a

@@ -21,7 +21,7 @@ use crate::geometry::points::Ends;
 use crate::geometry::simd::{Isa, Kernel, Vector};
 use crate::geometry::visibility::{BUNDLE, BUNDLES, Lanes};
 use crate::math::{DVec3, Vec3, frame};
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 /// Wedges around the line.
 const WEDGES: usize = 128;
@@ -33,6 +33,11 @@ const ROUNDING: [f64; 2] = [1e-5, 1e-6];
 const ASIDE: f32 = 0.02;
 /// The least distance from the centre to the surface, seen from the apex, that f32 leaves alone.
 const LEAST: f64 = 1e-3;
+
+/// Nearer than so many times the greatest distance of a corner from the centre no outline is made.
+const BEYOND: f64 = 1.01;
+/// Outlines of an object at one time, at most: of 1 kB each.
+const MOST: usize = 1 << 14;
 
 /// The outline from an apex, from when it is first asked for.
 pub(in crate::geometry) type Prospect = OnceLock<Option<Box<Outline>>>;
@@ -47,7 +52,12 @@ pub(in crate::geometry) struct Outline {
     /// z_n and z_f \[m\].
     near: f32,
     far: f32,
+    /// Held for as long as it is there.
+    _counted: Arc<()>,
 }
+
+/// w_o and w_i of a wedge of which nothing is known.
+const UNKNOWN: [f32; 2] = [f32::NEG_INFINITY, f32::INFINITY];
 
 /// What an outline is made of: w_o and w_i so far of the lines that cross the beginning of each wedge, and of the ends of lines within it.
 struct Draft {
@@ -69,11 +79,13 @@ struct Bearing {
 }
 
 impl Outline {
-    /// That of what `cage` holds, all between the distances `low` and `high` from its centre, from the point `apex`, seen from there \[m\]; `None` from too
-    /// near, or too far for f32.
+    /// That of a surface in the `cage`, between the distances `low` and `high` from its centre, from the point `apex`, seen from there \[m\]; `None` from
+    /// within the cage or near it, from too far for f32, and where there are very many.
     pub(super) fn new(cage: &Cage, (low, high): (f64, f64), apex: DVec3) -> Option<Outline> {
         let distance = apex.length();
-        if distance <= 1.01 * high || low < LEAST * distance {
+        // From within the net no rim would go around the axis. Written so, no number that is none passes.
+        let is_outside = distance > BEYOND * cage.reach.max(high) && low >= LEAST * distance;
+        if !is_outside || Arc::strong_count(&cage.outlines) > MOST {
             return None;
         }
         let towards = -apex / distance;
@@ -84,7 +96,8 @@ impl Outline {
         cage.rim(apex.as_vec3(), |ends, is_rim| draft.include(ends, is_rim));
         let off = (ROUNDING[0] + ROUNDING[1] * distance / low) as f32;
         let near = ((distance - high) * (1.0 - ROUNDING[0])) as f32;
-        Some(Outline { axes, bounds: draft.bounds(off), near, far: draft.far * (1.0 + off) })
+        let counted = Arc::clone(&cage.outlines);
+        Some(Outline { axes, bounds: draft.bounds(off), near, far: draft.far * (1.0 + off), _counted: counted })
     }
 }
 
@@ -141,11 +154,15 @@ impl Draft {
         if first > last {
             return;
         }
-        let inverse = 1.0 / ((b.turn - a.turn) * QUADRANT);
+        let extent = (b.turn - a.turn) * QUADRANT;
+        let inverse = 1.0 / extent;
         let slopes = [0, 1].map(|k| (b.w[k] - a.w[k]) * inverse);
         for k in first..=last {
             let way = k as f32 - a.turn * QUADRANT;
-            widen(&mut self.borders[k % WEDGES], [0, 1].map(|i| a.w[i] + slopes[i] * way));
+            // As far beyond it as points may be put into the wrong wedge.
+            for way in [(way - ASIDE).max(0.0), (way + ASIDE).min(extent)] {
+                widen(&mut self.borders[k % WEDGES], [0, 1].map(|i| a.w[i] + slopes[i] * way));
+            }
         }
     }
 
@@ -156,8 +173,8 @@ impl Draft {
             widen(bounds, self.borders[k]);
             widen(bounds, self.borders[(k + 1) % WEDGES]);
             // Where nothing goes around, nothing is known.
-            let inner = if bounds[1] > 0.0 { bounds[1] * (1.0 + off) } else { f32::INFINITY };
-            *bounds = [bounds[0] * (1.0 - off), inner];
+            let is_known = bounds[0] < f32::INFINITY && bounds[1] > 0.0;
+            *bounds = if is_known { [bounds[0] * (1.0 - off), bounds[1] * (1.0 + off)] } else { UNKNOWN };
         }
         bounds
     }

@@ -107,8 +107,7 @@ impl Rises {
     }
 }
 
-/// Puts the points `asked` of a tile as far towards `apex` as their ways there are clear, but leaves those where all of it is; `None` where no other
-/// is left.
+/// Puts the points `asked` of a tile as far towards `apex` as their ways there are clear, but leaves those where all of it is: those it gives.
 pub(super) struct Leave<'a> {
     pub(super) rises: &'a Rises,
     pub(super) apex: Vec3,

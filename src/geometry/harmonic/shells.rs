@@ -50,7 +50,7 @@ impl Shells {
         let moved = |factor: &dyn Fn(usize) -> f64| -> Vec<[DVec3; 3]> {
             triangles.iter().map(|t| t.map(|i| factor(i) * corners[i])).collect()
         };
-        let is_inside = factors.iter().all(|f| f.0 > 0.0);
+        let is_inside = margin < 1.0 && factors.iter().all(|f| f.0 > 0.0);
         let inner = if is_inside { moved(&|i| factors[i].0 * (1.0 - margin)) } else { Vec::new() };
         // Between corners with factors up to the greatest, q is at least the least.
         let (least, most) = factors.iter().fold((f64::INFINITY, 0f64), |(l, h), f| (l.min(f.0), h.max(f.1)));

@@ -213,25 +213,28 @@ fn exact_roots_from_within_lead_out() {
 #[test]
 fn an_outline_tells_of_nearly_all_points_and_never_wrongly() {
     let mut rng = generator("outlines");
-    for degree in [0, 8, 24] {
+    for (degree, uneven) in [(0, 1.0), (4, 1.0), (8, 1.0), (24, 1.0), (8, 1.3), (24, 1.3)] {
         let star = Star::new(rough(degree, &mut rng)).unwrap();
-        let turned = DMat3::from_cols(DVec3::new(0.6, 0.8, 0.0), DVec3::new(0.8, -0.6, 0.0), DVec3::Z * 1.3) * 0.3;
+        let turned = DMat3::from_cols(DVec3::new(0.6, 0.8, 0.0), DVec3::new(0.8, -0.6, 0.0), DVec3::Z * uneven) * 0.3;
         let object = Harmonic::new(star, DVec3::new(0.2, 0.1, -0.4), turned).unwrap();
         let corners = DVec3::splat(30.0);
         let object = object.shelled((-corners, corners));
         let (center, radius, _) = object.around();
-        let (mut known, mut missed, mut met, mut all) = (0, 0, 0, 0);
+        let (mut known, mut missed, mut met, mut all, mut near) = (0, 0, 0, 0, 0);
         for _ in 0..60 {
-            // From just outside to a hundred radii away; points on a disc beyond the object, and anywhere around.
+            // From just outside to fifty radii away; points on a disc beyond the object, and anywhere around.
             let apex = center
-                + sphere(rng.uniform2()) * radius * (1.02 + 50.0 * rng.uniform() * rng.uniform() * rng.uniform());
+                + sphere(rng.uniform2()) * radius * (1.011 + 50.0 * rng.uniform() * rng.uniform() * rng.uniform());
             let point = |k: usize, rng: &mut Generator| match k % 2 {
                 0 => 2.0 * center - apex + 4.0 * radius * sphere(rng.uniform2()),
                 _ => center + 3.0 * radius * rng.uniform() * sphere(rng.uniform2()),
             };
             let apex = apex.as_vec3();
             let points: Vec<_> = (0..TILE).map(|k| point(k, &mut rng).as_vec3()).collect();
-            let outline = object.outline(apex).unwrap();
+            let Some(outline) = object.outline(apex) else {
+                near += 1;
+                continue;
+            };
             let tile = Points::new(&Geometry::default(), &points);
             let sort = || Sort { outline: &outline, apex, ends: &tile.ends, asked: &[u16::MAX; BUNDLES] };
             let sorted = Path::Scalar.run(sort());
@@ -248,6 +251,7 @@ fn an_outline_tells_of_nearly_all_points_and_never_wrongly() {
                 (missed, met) = (missed + usize::from(free), met + usize::from(blocked));
             }
         }
+        assert!(near < 15, "degree {degree}: {near} of 60 too near");
         assert!(
             10 * known > 8 * all && 20 * missed > all && 20 * met > all,
             "degree {degree}: {missed} {met} of {all}"
