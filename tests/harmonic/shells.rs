@@ -82,10 +82,10 @@ fn tiles_beyond_beside_and_before_an_object_are_seen_as_by_the_series_alone() {
         let center = DVec3::new(0.3, -0.2, 0.4);
         let mut outside = || sphere(rng.uniform2()) * (1.7 + 1.5 * rng.uniform());
         let (apex, elsewhere) = (outside(), outside());
-        let middle = center + if tile % 2 == 0 { elsewhere } else { 0.4 * elsewhere - apex };
+        let middle = center + if tile % 2 == 0 { elsewhere } else { 0.6 * elsewhere - apex };
         let apex = (center + apex).as_vec3();
         let (e, f) = lampyris::math::frame(sphere(rng.uniform2()));
-        let size = 0.02 + 0.6 * rng.uniform();
+        let size = 0.1 + 3.0 * rng.uniform();
         let mut point = || middle + size * ((rng.uniform() - 0.5) * e + (rng.uniform() - 0.5) * f);
         let points: Vec<Vec3> = (0..TILE).map(|_| point().as_vec3()).collect();
         match hidden("tiles", &mut geometry, &object, apex, &points) {
