@@ -87,7 +87,9 @@ fn tiles_beyond_beside_and_before_an_object_are_seen_as_by_the_series_alone() {
         let (e, f) = lampyris::math::frame(sphere(rng.uniform2()));
         let size = 0.1 + 3.0 * rng.uniform();
         let mut point = || middle + size * ((rng.uniform() - 0.5) * e + (rng.uniform() - 0.5) * f);
-        let points: Vec<Vec3> = (0..TILE).map(|_| point().as_vec3()).collect();
+        // Between floor and ceiling.
+        let points: Vec<Vec3> =
+            (0..TILE).map(|_| point().clamp(DVec3::splat(-2.9), DVec3::splat(2.9)).as_vec3()).collect();
         match hidden("tiles", &mut geometry, &object, apex, &points) {
             0 => hidden_of[0] += 1,
             TILE => hidden_of[2] += 1,
