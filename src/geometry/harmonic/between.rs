@@ -1,10 +1,10 @@
 //! Rays and segments in the world against a star-shaped object: meshes first, the series for what is left.
 //!
-//! Between two points outside: what a plane stands before is free (`hull`); what passes beside the outline from a point is free too, what passes through
-//! it beyond the object is blocked (`outline`). For what is left, that which crosses the inner mesh is blocked; that which does not cross the outer
-//! one, where an end is certainly outside of that too, is free. A point just outside of the surface stands within the outer mesh, and nearly every segment from there would cross it. So
-//! its end is moved along the segment first, as far as that is certainly clear (`rise`). A way that is moved off by rounding stays within
-//! the room that the meshes leave.
+//! Between two points outside: what a plane stands before is free (`hull`); what passes beside the outline from a point is free too, what
+//! passes through it beyond the object is blocked (`outline`). Of what is left, that which crosses the inner mesh is blocked; that which does
+//! not cross the outer one, where an end is certainly outside of that too, is free. A point just outside of the surface stands within the
+//! outer mesh, and nearly every segment from there would cross it. So its end is moved along the segment first, as far as that is certainly
+//! clear (`rise`). A way that is moved off by rounding stays within the room that the meshes leave.
 
 use super::Crossing;
 use super::beside::{Beside, TileBeside, shares};
@@ -90,8 +90,8 @@ impl Harmonic {
             let sort = Sort { outline, apex, ends: &points.ends, asked: &others };
             let (certain, blocked) = shells.fine.outer.path.run(sort);
             free = joined(&free, &certain, |free, certain| free | certain);
-            open =
-                joined(&open, &joined(&certain, &blocked, |free, blocked| free | blocked), |open, known| open & !known);
+            let known = joined(&certain, &blocked, |certain, blocked| certain | blocked);
+            open = joined(&open, &known, |open, known| open & !known);
         }
         if open != [0; BUNDLES] {
             let (certain, left) = shells.fine.decide((apex, None), ends, &open, scratch);

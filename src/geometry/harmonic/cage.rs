@@ -3,8 +3,7 @@
 //! From an apex, some triangles of the outer net are seen from the front, others from the back. No point of it is seen farther from its centre than
 //! those of the edges between both: the rim.
 
-use super::lattice::Lattice;
-use super::shells::{Shells, triangles};
+use super::shells::Shells;
 use crate::math::{DMat3, Vec3};
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -64,11 +63,8 @@ struct Edge {
 impl Cage {
     /// That of `shells` with [`CELLS`]; `to_world` leads to the world, seen from the centre.
     pub(super) fn new(shells: &Shells, to_world: &DMat3) -> Cage {
-        let lattice = Lattice::new(CELLS);
-        let points: Vec<[usize; 3]> = lattice.points().collect();
-        let number = |p: [usize; 3]| points.binary_search(&p).expect("a point of the lattice");
-        let numbers: Vec<[usize; 3]> = triangles(&lattice).map(|t| t.map(number)).collect();
-        let mut corners = vec![Corner::default(); points.len()];
+        let numbers = &shells.numbers;
+        let mut corners = vec![Corner::default(); numbers.iter().flatten().max().map_or(0, |last| last + 1)];
         let mut sides: BTreeMap<[usize; 2], Vec<usize>> = BTreeMap::new();
         let mut planes: [Vec<f32>; 4] = std::array::from_fn(|_| vec![0.0; numbers.len()]);
         for (t, (numbers, triangle)) in numbers.iter().zip(&shells.outer).enumerate() {

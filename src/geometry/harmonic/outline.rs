@@ -205,6 +205,7 @@ fn on_axis(a: Place, b: Place, k: usize, share: f32) -> Bearing {
     Bearing { turn, w: [at[2] * inverse, at[3] * inverse] }
 }
 
+/// That of a place within a quadrant.
 #[inline(always)]
 fn bearing([x, y, outer, inner]: Place) -> Bearing {
     let inverse = 1.0 / (x.abs() + y.abs()).max(f32::MIN_POSITIVE);

@@ -24,6 +24,8 @@ pub(super) struct Shells {
     pub(super) inner: Vec<[DVec3; 3]>,
     /// No point of these is inside.
     pub(super) outer: Vec<[DVec3; 3]>,
+    /// The numbers of the corners of each triangle, the same for both.
+    pub(super) numbers: Vec<[usize; 3]>,
     /// No point of `outer` is farther from the centre than so many times the radius of the surface in its direction.
     pub(super) reach: f64,
 }
@@ -55,12 +57,13 @@ impl Shells {
         // Between corners with factors up to the greatest, q is at least the least.
         let (least, most) = factors.iter().fold((f64::INFINITY, 0f64), |(l, h), f| (l.min(f.0), h.max(f.1)));
         let reach = if least > 0.0 { most * (1.0 + margin) / least * (1.0 + margin) } else { f64::INFINITY };
-        Shells { inner, outer: moved(&|i| factors[i].1 * (1.0 + margin)), reach }
+        let outer = moved(&|i| factors[i].1 * (1.0 + margin));
+        Shells { inner, outer, numbers: triangles, reach }
     }
 }
 
 /// Two triangles for each cell of the faces of the cube, their fronts outward.
-pub(super) fn triangles(lattice: &Lattice) -> impl Iterator<Item = [[usize; 3]; 3]> {
+fn triangles(lattice: &Lattice) -> impl Iterator<Item = [[usize; 3]; 3]> {
     let n = lattice.cells();
     (0..6).flat_map(move |face| {
         let cells = (0..n).flat_map(move |u| (0..n).map(move |v| (u, v)));
