@@ -45,9 +45,10 @@ pub use series::{Bend, MAX_DEGREE, Series, Slope};
 use crate::error::{Error, Result};
 use crate::math::{DVec3, PI};
 use bounds::bends;
+use hull::Hull;
 use regions::Steepness;
 use roots::Wave;
-use samples::Samples;
+use samples::{Guess, Samples};
 use std::sync::Arc;
 use steps::{Taylor, safe_step};
 
@@ -67,6 +68,8 @@ pub struct Star {
     series: Series,
     bounds: Bounds,
     samples: Arc<Samples>,
+    /// What all of the surface lies within, where that is known.
+    hull: Option<Arc<Hull>>,
 }
 
 /// Where a line crosses a surface.
@@ -118,7 +121,7 @@ impl Star {
             let allowed = "a radius above 0 in every direction, by the bounds of its derivatives too";
             return Err(Error::input("series", "least radius", bounds.low, allowed));
         }
-        Ok(Star { series, bounds, samples: Arc::new(samples) })
+        Ok(Star { series, bounds, samples: Arc::new(samples), hull: None })
     }
 
     /// The series.
@@ -195,7 +198,7 @@ impl Star {
                 continue;
             }
             let x = o + at * d;
-            let (guess, errors, around) = self.samples.height(x, d);
+            let Guess { along: guess, errors, upward, around } = self.samples.height(x, d);
             let guessed = if side == 0.0 { guess.value.signum() } else { side };
             let step = |along: &Taylor, side: f64| {
                 // What holds around here, and where that is not far enough what holds everywhere.
@@ -216,6 +219,9 @@ impl Star {
             }
             if is_certain {
                 at = beyond(at + step(&fall.along.less(errors), side), side);
+                if side > 0.0 && guess.first > 0.0 && self.is_left(o + at * d, d, upward) {
+                    return None;
+                }
                 continue;
             }
             let here = self.height(x, d);
@@ -235,6 +241,11 @@ impl Star {
         }
         // Lost in rounding, as no line is known to be: better blocked than leaking.
         Some(Met::Root(at.min(end)))
+    }
+
+    /// True where the line from `x` along `d` certainly rises above all of the surface, as a plane across `upward` tells.
+    fn is_left(&self, x: DVec3, d: DVec3, upward: DVec3) -> bool {
+        upward.dot(d) > 0.0 && self.hull.as_ref().is_some_and(|hull| upward.dot(x) > hull.support(upward))
     }
 
     /// The way within which F, or -F, crosses 0 from a place `x` on a line: where it certainly does, once, without having turned.

@@ -105,22 +105,22 @@ impl Harmonic {
     /// True where a plane certainly stands between the object and all segments from `apex` to the points of a tile.
     fn is_apart(&self, apex: Vec3, points: &Points, beside: &TileBeside) -> bool {
         let none = [0; BUNDLES];
-        let Some(shells) = self.shells.as_ref().filter(|_| beside.near == none && beside.inside == none) else {
+        let Some(hull) = self.star.hull.as_ref().filter(|_| beside.near == none && beside.inside == none) else {
             return false;
         };
         let (low, high) = points.ends.tile;
         let (low, high) = (DVec3::from(low.map(f64::from)), DVec3::from(high.map(f64::from)));
         let (middle, half) = (0.5 * (low + high) - self.center, 0.5 * (high - low));
         // Points far from all have no part in the box.
-        points.ends.far == none && shells.hull.is_apart(&self.to_world, apex.as_dvec3() - self.center, (middle, half))
+        points.ends.far == none && hull.is_apart(&self.to_world, apex.as_dvec3() - self.center, (middle, half))
     }
 
     /// How the object is seen from `apex` \[m\].
     pub(super) fn outline(&self, apex: Vec3) -> Option<Box<Outline>> {
         let (center, high, _) = self.around();
         let low = self.star.bounds.low / self.shrunk;
-        let cage = &self.shells.as_ref()?.cage;
-        Outline::new(cage, (low, high), apex.as_dvec3() - center).map(Box::new)
+        let Shelled { cage, fine } = self.shells.as_deref()?;
+        Outline::new(cage, (low, high), apex.as_dvec3() - center, fine.outer.path).map(Box::new)
     }
 
     /// The same for an `apex` that may be within the outer mesh, where it is `here`.

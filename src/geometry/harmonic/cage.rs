@@ -17,6 +17,8 @@ const TOGETHER: usize = 8;
 const PATCHES: usize = 12 * CELLS * CELLS / TOGETHER;
 /// Patches that the edges of one lie in, at most, itself among them.
 const BESIDE: usize = 5;
+/// Edges of a net, and room for one that does not count.
+pub(super) const EDGES: usize = 18 * CELLS * CELLS + 1;
 /// What f32 rounds of how a triangle faces, in units of the distance.
 const ROUNDING: f32 = 4e-6;
 
@@ -42,6 +44,14 @@ pub(super) struct Cage {
     /// Patch by patch.
     edges: Vec<Edge>,
     patches: Vec<Patch>,
+}
+
+/// An edge that may be part of a rim.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Found {
+    ends: [u16; 2],
+    /// Whether it is, and not only maybe.
+    pub(super) is_rim: bool,
 }
 
 /// Edges that are looked at together.
@@ -101,9 +111,9 @@ impl Cage {
         Cage { reach, outlines: Arc::new(()), corners, planes, edges, patches }
     }
 
-    /// Calls `f` with the ends of each edge that may be part of the rim, seen from `apex` \[m\] from the centre, and whether it is, for what goes around
-    /// all of the net.
-    pub(super) fn rim(&self, apex: Vec3, mut f: impl FnMut([&Corner; 2], bool)) {
+    /// Puts into `found` the edges that may be part of the rim of what goes around all of the net, seen from `apex` \[m\] from the centre; gives how many.
+    #[inline(always)]
+    pub(super) fn rim(&self, apex: Vec3, found: &mut [Found; EDGES]) -> usize {
         let doubt = ROUNDING * apex.length();
         // 2: maybe edge-on.
         let mut facing = [[0u8; TOGETHER]; PATCHES];
@@ -112,23 +122,35 @@ impl Cage {
             let height = apex.x * x[i] + apex.y * y[i] + apex.z * z[i] - d[i];
             *facing = u8::from(height > 0.0) | u8::from(height.abs() <= doubt) << 1;
         }
-        for patch in &self.patches {
+        // Whether a patch or an edge counts is as good as random: what is written is kept or not, without a branch.
+        let (mut mixed, mut patches) = ([0; PATCHES + 1], 0);
+        for (number, patch) in self.patches.iter().enumerate() {
             let (mut any, mut all) = (0, u64::MAX);
             for number in patch.of {
                 let facing = u64::from_ne_bytes(facing[usize::from(number)]);
                 (any, all) = (any | facing, all & facing);
             }
-            if any == 0 || any == all && all == u64::from_ne_bytes([1; TOGETHER]) {
-                // All backs, or all fronts.
-                continue;
-            }
-            for edge in &self.edges[patch.edges.clone()] {
-                let [a, b] = edge.sides.map(|side| facing.as_flattened()[usize::from(side)]);
-                if (a ^ b) & 1 | (a | b) & 2 != 0 {
-                    f(edge.ends.map(|end| &self.corners[usize::from(end)]), (a ^ b) & 1 == 1);
-                }
+            let is_back = any == 0;
+            let is_front = any == all && all == u64::from_ne_bytes([1; TOGETHER]);
+            mixed[patches] = number;
+            patches += usize::from(!(is_back | is_front));
+        }
+        let facing = facing.as_flattened();
+        let mut count = 0;
+        for &number in &mixed[..patches] {
+            for edge in &self.edges[self.patches[number].edges.clone()] {
+                let (a, b) = (facing[usize::from(edge.sides[0])], facing[usize::from(edge.sides[1])]);
+                found[count] = Found { ends: edge.ends, is_rim: (a ^ b) & 1 == 1 };
+                count += usize::from((a ^ b) & 1 | (a | b) & 2 != 0);
             }
         }
+        count
+    }
+
+    /// Where an edge of the rim ends.
+    #[inline(always)]
+    pub(super) fn ends(&self, found: &Found) -> [&Corner; 2] {
+        [&self.corners[usize::from(found.ends[0])], &self.corners[usize::from(found.ends[1])]]
     }
 
     /// Memory \[bytes\].

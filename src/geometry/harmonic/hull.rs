@@ -21,6 +21,7 @@ const TOGETHER: usize = 32;
 const ROUNDING: f64 = 1e-12;
 
 /// The support function of a surface, from above.
+#[derive(Debug)]
 pub(super) struct Hull {
     /// Of the points of the lattice, face by face, u by u.
     support: Vec<f64>,

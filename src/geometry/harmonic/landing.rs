@@ -60,7 +60,7 @@ impl Star {
                 break;
             }
             at += step;
-            along = self.samples.height(o + at * d, d).0.times(fall.side);
+            along = self.samples.height(o + at * d, d).along.times(fall.side);
         }
         at + along.root()
     }

@@ -16,9 +16,9 @@
 //! The share q = |y|/(|x| + |y|) tells the direction within a quadrant, and along a straight edge w is linear in q: both are quotients of
 //! linear functions with the same denominator.
 
-use super::cage::{Cage, Corner};
+use super::cage::{Cage, EDGES, Found};
 use crate::geometry::points::Ends;
-use crate::geometry::simd::{Isa, Kernel, Vector};
+use crate::geometry::simd::{Isa, Kernel, Path, Vector};
 use crate::geometry::visibility::{BUNDLE, BUNDLES, Lanes};
 use crate::math::{DVec3, Vec3, frame};
 use std::sync::{Arc, OnceLock};
@@ -71,7 +71,7 @@ struct Draft {
 /// Coordinates across the line, and along it in the outer net and in the inner one.
 type Place = [f32; 4];
 
-/// Which way a place lies from the line, 0 to 4 for a whole turn, and w in both nets; in the inner one 0 where that does not count.
+/// Which way a place lies from the line, in wedges, and w in both nets; in the inner one 0 where that does not count.
 #[derive(Clone, Copy)]
 struct Bearing {
     turn: f32,
@@ -81,7 +81,7 @@ struct Bearing {
 impl Outline {
     /// That of a surface in the `cage`, between the distances `low` and `high` from its centre, from the point `apex`, seen from there \[m\]; `None` from
     /// within the cage or near it, from too far for f32, and where there are very many.
-    pub(super) fn new(cage: &Cage, (low, high): (f64, f64), apex: DVec3) -> Option<Outline> {
+    pub(super) fn new(cage: &Cage, (low, high): (f64, f64), apex: DVec3, path: Path) -> Option<Outline> {
         let distance = apex.length();
         // From within the net no rim would go around the axis. Written so, no number that is none passes.
         let is_outside = distance > BEYOND * cage.reach.max(high) && low >= LEAST * distance;
@@ -91,9 +91,7 @@ impl Outline {
         let towards = -apex / distance;
         let (e, f) = frame(towards);
         let axes = [e, f, towards].map(|v| v.as_vec3());
-        let none = [[f32::INFINITY, 0.0]; WEDGES];
-        let mut draft = Draft { axes, distance: distance as f32, far: distance as f32, borders: none, ends: none };
-        cage.rim(apex.as_vec3(), |ends, is_rim| draft.include(ends, is_rim));
+        let draft = path.run(Sketch { cage, apex: apex.as_vec3(), axes, distance: distance as f32 });
         let off = (ROUNDING[0] + ROUNDING[1] * distance / low) as f32;
         let near = ((distance - high) * (1.0 - ROUNDING[0])) as f32;
         let counted = Arc::clone(&cage.outlines);
@@ -101,67 +99,151 @@ impl Outline {
     }
 }
 
-impl Draft {
-    /// Takes in an edge of the outer net, and where it is part of the rim, that of the inner one.
+/// The rim of a cage, from an apex that it is at this `distance` from.
+struct Sketch<'a> {
+    cage: &'a Cage,
+    apex: Vec3,
+    axes: [Vec3; 3],
+    distance: f32,
+}
+
+impl Kernel for Sketch<'_> {
+    type Output = Draft;
+
     #[inline(always)]
-    fn include(&mut self, ends: [&Corner; 2], is_rim: bool) {
-        let [a, b] = ends.map(|end| {
-            let [x, y, z] = self.axes.map(|axis| axis.dot(end.outer));
-            // The inner corner is in the same direction from the centre, nearer to it: these are that many times its coordinates.
-            let inner = if is_rim { z + self.distance * end.ratio } else { 0.0 };
-            [x, y, z + self.distance, inner]
-        });
-        if is_rim {
-            self.far = self.far.max(a[3] / ends[0].ratio).max(b[3] / ends[1].ratio);
+    fn run<I: Isa>(self) -> Draft {
+        let Sketch { cage, apex, axes, distance } = self;
+        let none = [[f32::INFINITY, 0.0]; WEDGES];
+        let mut draft = Draft { axes, distance, far: distance, borders: none, ends: none };
+        let mut found = [Found::default(); EDGES];
+        let count = cage.rim(apex, &mut found);
+        let mut far = I::Sixteen::splat(distance);
+        for edges in found[..count].chunks(BUNDLE) {
+            far = far.max(draft.include::<I>(cage, edges));
         }
-        let crossing = |k: usize| if (a[k] < 0.0) != (b[k] < 0.0) { a[k] / (a[k] - b[k]) } else { 2.0 };
-        let shares = [crossing(0), crossing(1)];
-        let mut from = bearing(a);
-        self.end(from);
-        if shares != [2.0; 2] {
-            let order = if shares[0] <= shares[1] { [0, 1] } else { [1, 0] };
-            for k in order.into_iter().filter(|&k| shares[k] <= 1.0) {
-                let axis = on_axis(a, b, k, shares[k]);
-                self.spread(from, axis);
-                self.end(axis);
-                from = axis;
+        let mut lanes = [0.0; BUNDLE];
+        far.store(&mut lanes);
+        for lane in lanes {
+            draft.far = if lane > draft.far { lane } else { draft.far };
+        }
+        draft
+    }
+}
+
+impl Draft {
+    /// Takes in up to sixteen edges of the outer net, and of those that are part of the rim the edges of the inner one; gives how far these lie.
+    #[inline(always)]
+    fn include<I: Isa>(&mut self, cage: &Cage, edges: &[Found]) -> I::Sixteen {
+        // What is left of sixteen repeats the first.
+        let mut corners = [[[0.0; BUNDLE]; 4]; 2];
+        let mut rim = 0;
+        for lane in 0..BUNDLE {
+            let edge = &edges[if lane < edges.len() { lane } else { 0 }];
+            let ends = cage.ends(edge);
+            rim |= u32::from(edge.is_rim) << lane;
+            for end in 0..2 {
+                corners[end][0][lane] = ends[end].outer.x;
+                corners[end][1][lane] = ends[end].outer.y;
+                corners[end][2][lane] = ends[end].outer.z;
+                corners[end][3][lane] = ends[end].ratio;
             }
         }
-        let to = bearing(b);
-        self.spread(from, to);
-        self.end(to);
+        let distance = I::Sixteen::splat(self.distance);
+        let mut far = distance;
+        let mut places = [[distance; 4]; 2];
+        let mut bearings = [[distance; 3]; 2];
+        for end in 0..2 {
+            let columns = &corners[end];
+            let corner = [I::Sixteen::load(&columns[0]), I::Sixteen::load(&columns[1]), I::Sixteen::load(&columns[2])];
+            let ratio = I::Sixteen::load(&columns[3]);
+            let (x, y) = (along::<I>(&corner, self.axes[0]), along::<I>(&corner, self.axes[1]));
+            let z = along::<I>(&corner, self.axes[2]);
+            // The inner corner is in the same direction from the centre, nearer to it: these are that many times its coordinates.
+            let inner = z.add(distance.mul(ratio)).select(rim);
+            far = far.max(z.div(ratio).add(distance).select(rim));
+            places[end] = [x, y, z.add(distance), inner];
+            bearings[end] = bearing::<I>(&places[end]);
+        }
+        let ([a, b], [from, to]) = (&bearings, &places);
+        let zero = I::Sixteen::splat(0.0);
+        let across = (from[0].less(zero) ^ to[0].less(zero)) | (from[1].less(zero) ^ to[1].less(zero));
+        let inverse = I::Sixteen::splat(1.0).div(b[0].sub(a[0]));
+        let mut slopes = [[0.0; BUNDLE]; 2];
+        b[1].sub(a[1]).mul(inverse).store(&mut slopes[0]);
+        b[2].sub(a[2]).mul(inverse).store(&mut slopes[1]);
+        let mut ways = [[[0.0; BUNDLE]; 3]; 2];
+        for end in 0..2 {
+            for k in 0..3 {
+                bearings[end][k].store(&mut ways[end][k]);
+            }
+            // The places are asked for by few: `corners` has been read.
+            for k in 0..4 {
+                places[end][k].store(&mut corners[end][k]);
+            }
+        }
+        for lane in 0..edges.len() {
+            let a = Bearing { turn: ways[0][0][lane], w: [ways[0][1][lane], ways[0][2][lane]] };
+            let b = Bearing { turn: ways[1][0][lane], w: [ways[1][1][lane], ways[1][2][lane]] };
+            self.end(a);
+            self.end(b);
+            if across >> lane & 1 == 0 {
+                let (low, high) = if a.turn <= b.turn { (a, b) } else { (b, a) };
+                self.spread(low, high.turn, [slopes[0][lane], slopes[1][lane]]);
+            } else {
+                self.spread_across(&corners, lane, [a, b]);
+            }
+        }
+        far
     }
 
+    /// Takes in what lies between the ends of an edge that leaves a quadrant, in a lane of its `places`.
+    #[inline(never)]
+    fn spread_across(&mut self, places: &[[[f32; BUNDLE]; 4]; 2], lane: usize, [mut from, to]: [Bearing; 2]) {
+        let [a, b] = places.each_ref().map(|columns| columns.map(|column| column[lane]));
+        let crossing = |k: usize| if (a[k] < 0.0) != (b[k] < 0.0) { a[k] / (a[k] - b[k]) } else { 2.0 };
+        let shares = [crossing(0), crossing(1)];
+        let order = if shares[0] <= shares[1] { [0, 1] } else { [1, 0] };
+        for k in order.into_iter().filter(|&k| shares[k] <= 1.0) {
+            let axis = on_axis(a, b, k, shares[k]);
+            self.spread_between(from, axis);
+            self.end(axis);
+            from = axis;
+        }
+        self.spread_between(from, to);
+    }
+
+    /// Takes in what lies between two places in a quadrant.
+    fn spread_between(&mut self, a: Bearing, b: Bearing) {
+        let (mut low, mut high) = if a.turn <= b.turn { (a, b) } else { (b, a) };
+        if high.turn - low.turn > 1.5 * QUADRANT {
+            // The beginning of a turn is the end of one.
+            (low, high) = (high, Bearing { turn: low.turn + WEDGES as f32, w: low.w });
+        }
+        let inverse = 1.0 / (high.turn - low.turn);
+        self.spread(low, high.turn, [0, 1].map(|k| (high.w[k] - low.w[k]) * inverse));
+    }
     /// Takes in the end of a line, in both wedges where it is at the border of two.
     #[inline(always)]
     fn end(&mut self, at: Bearing) {
         // A turn more: what is positive is rounded down by a mere conversion.
-        let turn = at.turn * QUADRANT + WEDGES as f32;
-        for k in [turn - ASIDE, turn + ASIDE] {
-            widen(&mut self.ends[k as usize % WEDGES], at.w);
+        let turn = at.turn + WEDGES as f32;
+        let (first, last) = ((turn - ASIDE) as usize % WEDGES, (turn + ASIDE) as usize % WEDGES);
+        widen(&mut self.ends[first], at.w);
+        if last != first {
+            widen(&mut self.ends[last], at.w);
         }
     }
 
-    /// Takes in what lies between two places in a quadrant, where wedges begin.
+    /// Takes in what lies between `low` and a place in the same quadrant that is `high` of a turn, where wedges begin; w grows by `slopes` for each wedge.
     #[inline(always)]
-    fn spread(&mut self, a: Bearing, b: Bearing) {
-        let (mut a, mut b) = if a.turn <= b.turn { (a, b) } else { (b, a) };
-        if b.turn - a.turn > 1.5 {
-            // The beginning of a turn is the end of one.
-            (a, b) = (b, Bearing { turn: a.turn + 4.0, w: a.w });
-        }
-        let (first, last) = ((a.turn * QUADRANT) as usize + 1, (b.turn * QUADRANT) as usize);
-        if first > last {
-            return;
-        }
-        let extent = (b.turn - a.turn) * QUADRANT;
-        let inverse = 1.0 / extent;
-        let slopes = [0, 1].map(|k| (b.w[k] - a.w[k]) * inverse);
+    fn spread(&mut self, low: Bearing, high: f32, slopes: [f32; 2]) {
+        let (first, last) = (low.turn as usize + 1, high as usize);
         for k in first..=last {
-            let way = k as f32 - a.turn * QUADRANT;
+            let way = k as f32 - low.turn;
             // As far beyond it as points may be put into the wrong wedge.
-            for way in [(way - ASIDE).max(0.0), (way + ASIDE).min(extent)] {
-                widen(&mut self.borders[k % WEDGES], [0, 1].map(|i| a.w[i] + slopes[i] * way));
+            for way in [(way - ASIDE).max(0.0), (way + ASIDE).min(high - low.turn)] {
+                let w = [low.w[0] + slopes[0] * way, low.w[1] + slopes[1] * way];
+                widen(&mut self.borders[k % WEDGES], w);
             }
         }
     }
@@ -202,21 +284,30 @@ fn on_axis(a: Place, b: Place, k: usize, share: f32) -> Bearing {
         0.0
     };
     let inverse = 1.0 / other.abs().max(f32::MIN_POSITIVE);
-    Bearing { turn, w: [at[2] * inverse, at[3] * inverse] }
+    Bearing { turn: turn * QUADRANT, w: [at[2] * inverse, at[3] * inverse] }
 }
 
-/// That of a place within a quadrant.
+/// Which way places lie from the line, and w in both nets.
 #[inline(always)]
-fn bearing([x, y, outer, inner]: Place) -> Bearing {
-    let inverse = 1.0 / (x.abs() + y.abs()).max(f32::MIN_POSITIVE);
-    let share = y.abs() * inverse;
-    let (sign, start) = match (x < 0.0, y < 0.0) {
-        (false, false) => (1.0, 0.0),
-        (true, false) => (-1.0, 2.0),
-        (true, true) => (1.0, 2.0),
-        (false, true) => (-1.0, 4.0),
-    };
-    Bearing { turn: start + sign * share, w: [outer * inverse, inner * inverse] }
+fn bearing<I: Isa>(place: &[I::Sixteen; 4]) -> [I::Sixteen; 3] {
+    let [x, y, outer, inner] = *place;
+    let across = x.abs().add(y.abs()).max(I::Sixteen::splat(f32::MIN_POSITIVE));
+    let inverse = I::Sixteen::splat(1.0).div(across);
+    [turn::<I>(x, y, y.abs().mul(inverse)), outer.mul(inverse), inner.mul(inverse)]
+}
+
+/// Which way places lie from the line, whose y is this `share` of |x| + |y|.
+#[inline(always)]
+fn turn<I: Isa>(x: I::Sixteen, y: I::Sixteen, share: I::Sixteen) -> I::Sixteen {
+    // share, 2 - share, 2 + share and 4 - share quadrants, each in its own.
+    let zero = I::Sixteen::splat(0.0);
+    let (left, low) = (x.less(zero), y.less(zero));
+    let back = I::Sixteen::splat(QUADRANT).mul(share);
+    let mirrored = I::Sixteen::splat(-1.0).mul(back);
+    let whole = I::Sixteen::splat(2.0 * QUADRANT);
+    let start = whole.select(left).add(whole.add(whole).select(low & !left));
+    let turned = (left ^ low) & 0xFFFF;
+    start.add(back.select(!turned)).add(mirrored.select(turned))
 }
 
 /// The points `asked` whose segments from `apex` are certainly free, and those whose are certainly blocked.
@@ -234,7 +325,6 @@ impl Kernel for Sort<'_> {
     fn run<I: Isa>(self) -> (Lanes, Lanes) {
         let Sort { outline, apex, ends, asked } = self;
         let (mut free, mut blocked) = ([0; BUNDLES], [0; BUNDLES]);
-        let zero = I::Sixteen::splat(0.0);
         let [e, f, towards] = outline.axes;
         let (near, far) = (I::Sixteen::splat(outline.near), I::Sixteen::splat(outline.far));
         let mut wedges = [0.0; BUNDLE];
@@ -248,14 +338,7 @@ impl Kernel for Sort<'_> {
             let (width, height) = (x.abs(), y.abs());
             let across = width.add(height);
             let share = height.div(across.max(I::Sixteen::splat(f32::MIN_POSITIVE)));
-            // As `bearing`: 0, 2 - 2 share, 2 and 4 - 2 share more, each with its quadrant.
-            let (left, low) = (x.less(zero), y.less(zero));
-            let back = I::Sixteen::splat(QUADRANT).mul(share);
-            let mirrored = I::Sixteen::splat(-1.0).mul(back);
-            let whole = I::Sixteen::splat(2.0 * QUADRANT);
-            let start = whole.select(left).add(whole.add(whole).select(low & !left));
-            let turned = (left ^ low) & 0xFFFF;
-            start.add(back.select(!turned)).add(mirrored.select(turned)).store(&mut wedges);
+            turn::<I>(x, y, share).store(&mut wedges);
             for lane in 0..BUNDLE {
                 let [outer, inner] = outline.bounds[wedges[lane] as usize % WEDGES];
                 (bounds[0][lane], bounds[1][lane]) = (outer, inner);

@@ -32,7 +32,7 @@ pub struct Harmonic {
 }
 
 /// Cells of the meshes along an edge of the cube.
-const FINE: usize = 48;
+const FINE: usize = 32;
 
 /// What a distance from the centre is widened by for its rounding.
 const ROUNDING: f64 = 1.0 + 1e-9;
@@ -42,8 +42,6 @@ pub(super) struct Shelled {
     /// The nets whose outline is seen.
     pub(super) cage: Cage,
     pub(super) fine: Pair,
-    /// What all of the surface lies within.
-    pub(super) hull: Hull,
 }
 
 /// Two meshes: what crosses the inner one crosses the surface; what does not cross the outer one does not, where one end is outside of that too.
@@ -82,7 +80,8 @@ impl Harmonic {
     pub(in crate::geometry) fn bytes(&self) -> u64 {
         let of = |pair: &Pair| pair.inner.bytes() + pair.outer.bytes();
         self.star.samples.bytes()
-            + self.shells.as_ref().map_or(0, |shells| shells.cage.bytes() + of(&shells.fine) + shells.hull.bytes())
+            + self.shells.as_ref().map_or(0, |shells| shells.cage.bytes() + of(&shells.fine))
+            + self.star.hull.as_ref().map_or(0, |hull| hull.bytes())
     }
 
     /// The object in its own coordinates.
@@ -147,10 +146,8 @@ impl Harmonic {
         let certain = (length - look.value).abs() > error;
         let inside = if certain { length < look.value } else { length < self.star.series.value(n) };
         let frames = (&self.to_own, &self.to_world);
-        let rise = |shells: &Arc<Shelled>| {
-            Rise::new(own, &look, (self.star.samples.reach(), &shells.hull), frames, self.shrunk)
-        };
-        Beside { inside, near, rise: self.shells.as_ref().filter(|_| near && !inside).map(rise) }
+        let rise = |hull: &Arc<Hull>| Rise::new(own, &look, (self.star.samples.reach(), hull), frames, self.shrunk);
+        Beside { inside, near, rise: self.star.hull.as_ref().filter(|_| near && !inside).map(rise) }
     }
 
     /// The same object with meshes inside and outside of it, for rays that come from anywhere in the box `around` \[m\].
@@ -174,7 +171,8 @@ impl Harmonic {
         };
         let [coarse, fine] = [cage::CELLS, FINE].map(|cells| Shells::new(&self.star, cells, margin));
         let cage = Cage::new(&coarse, &self.to_world);
-        let shelled = Shelled { cage, fine: pair(&fine), hull: Hull::new(&fine.outer) };
+        let shelled = Shelled { cage, fine: pair(&fine) };
+        self.star.hull = Some(Arc::new(Hull::new(&fine.outer)));
         let reach = self.around().1 * fine.reach * ROUNDING;
         self.reach2 = reach * reach;
         self.shells = Some(Arc::new(shelled));

@@ -85,8 +85,8 @@ impl Samples {
         (f64::from(sample.value) + w.dot(gradient + 0.5 * (hessian * w)), self.error_of_value(around, angle))
     }
 
-    /// F and its derivatives at `x` along the unit vector `d`, how wrong each may be, and what holds around there.
-    pub(super) fn height(&self, x: DVec3, d: DVec3) -> (Taylor, Taylor, &Steepness) {
+    /// F and its derivatives at `x`, along the unit vector `d`.
+    pub(super) fn height(&self, x: DVec3, d: DVec3) -> Guess<'_> {
         let length = x.length();
         let n = x / length;
         let Near { sample, v, around } = self.beside(n);
@@ -97,16 +97,17 @@ impl Samples {
 
         let c = n.dot(d);
         let across = d - c * n;
-        let turned = turned(n, v, across);
-        let slope = (gradient + bent).dot(turned);
-        let bend = turned.dot(hessian * turned);
+        let gradient = turned(v, n, gradient + bent);
+        let across = turned(n, v, across);
+        let slope = gradient.dot(d);
+        let bend = across.dot(hessian * across);
         let sine_squared = 1.0 - c * c;
-        let height = Taylor {
+        let along = Taylor {
             value: length - value,
             first: c - slope / length,
             second: (sine_squared - (bend - 2.0 * c * slope) / length) / length,
         };
-        (height, self.errors(around, angle, length), around)
+        Guess { along, errors: self.errors(around, angle, length), upward: n - gradient / length, around }
     }
 
     /// The shape of the surface in the direction `n`.
@@ -153,6 +154,18 @@ struct Near<'a> {
     sample: &'a Sample,
     v: DVec3,
     around: &'a Steepness,
+}
+
+/// What samples say of F in a place.
+pub(super) struct Guess<'a> {
+    /// It and its derivatives along a line.
+    pub(super) along: Taylor,
+    /// How wrong each may be.
+    pub(super) errors: Taylor,
+    /// Its gradient in space.
+    pub(super) upward: DVec3,
+    /// What holds around there.
+    pub(super) around: &'a Steepness,
 }
 
 /// What samples say of a series in a direction.

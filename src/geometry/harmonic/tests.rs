@@ -36,7 +36,7 @@ fn samples_are_no_farther_from_the_series_than_they_say() {
         for _ in 0..4000 {
             let (n, d) = (sphere(rng.uniform2()), sphere(rng.uniform2()));
             let x = n * star.bounds.high * (0.8 + 0.4 * rng.uniform());
-            let (guess, errors, _) = star.samples.height(x, d);
+            let Guess { along: guess, errors, .. } = star.samples.height(x, d);
             let truth = star.height(x, d).along;
             for (guess, error, truth) in [
                 (guess.value, errors.value, truth.value),
