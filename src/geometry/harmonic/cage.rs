@@ -10,7 +10,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 /// Cells of the nets along an edge of the cube.
-pub(super) const CELLS: usize = 12;
+pub(super) const CELLS: usize = 8;
 /// Triangles of a patch of 2 x 2 cells, which stand together.
 const TOGETHER: usize = 8;
 /// Patches of a net.

@@ -24,7 +24,7 @@ use crate::math::{DVec3, Vec3, frame};
 use std::sync::{Arc, OnceLock};
 
 /// Wedges around the line.
-const WEDGES: usize = 128;
+const WEDGES: usize = 64;
 /// Those of a quadrant.
 const QUADRANT: f32 = (WEDGES / 4) as f32;
 /// What is taken off w for rounding: of itself, and of that in units of its least.
