@@ -22,7 +22,7 @@ const LOOKS: usize = 4;
 /// Sums of the series, at most.
 const SUMS: usize = 6;
 /// What the gradient may be off, in units of the radius.
-const NORMAL: f64 = 1e-10;
+const NORMAL: f64 = 1e-9;
 
 impl Star {
     /// The crossing of the line from `o` along the unit vector `d` that `fall` comes to.

@@ -27,7 +27,9 @@ const DEGREES: usize = 8;
 const MOST: usize = 4;
 /// Rounds of points whose derivatives are found together.
 const TOGETHER: usize = 1024;
-/// What f32 rounds, and the expansion of an angle, of the largest numbers of their kind.
+/// What f32 rounds, and the expansion of an angle, of the largest values and slopes.
+const HALF_ULP: f64 = 6.2e-8;
+/// The same of derivatives, several of which count.
 const ROUNDING: f64 = 4e-7;
 
 /// A series at the points of a lattice.
@@ -138,7 +140,7 @@ impl Samples {
     }
 
     fn error_of_value(&self, around: &Steepness, angle: f64) -> f64 {
-        around.third * angle * angle * angle / 6.0 + ROUNDING * (self.bounds.high + self.bounds.first)
+        around.third * angle * angle * angle / 6.0 + HALF_ULP * (self.bounds.high + self.bounds.first)
     }
 
     /// A sample beside the direction `n`.
