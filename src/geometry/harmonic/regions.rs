@@ -9,9 +9,14 @@
 //! ```
 //!
 //! and D of any direction is a combination of both. The greatest magnitude of D(w)(w,w), w a unit vector, is then known in the middle of each
-//! cell; elsewhere in the cell it is at most M4 |a| more; and nowhere, by M. Riesz as in `bounds`, more than the greatest in a
-//! middle over cos(N |a|). Other components of D exceed it by 2/3 M1 at most: exchanging two derivatives on a unit sphere adds no more than the
-//! gradient, and in two of three places. M3 bounds all of them.
+//! cell; and nowhere, by M. Riesz as in `bounds`, more than the greatest in a middle over cos(N |a|). Other components of D exceed it by 2/3 M1 at
+//! most: exchanging two derivatives on a unit sphere adds no more than the gradient, and in two of three places. M3 bounds all of them.
+//!
+//! A place x lies among the middles of the cells around a point q of the lattice, at the ways b_i from x: with weights that are not
+//! negative, sum l_i b_i = 0. Along each, D(w)(w,w) with w carried along is a sum of waves of up to N turns, whose second derivative is at
+//! most N^2 M3 (Bernstein). So D(w)(w,w) at x is the mean of those in the middles up to sum l_i |b_i|^2 N^2 M3/2, where
+//! sum l_i |b_i|^2 <= sum l_i |b_i - o|^2 for any o, and with that of q no more than |a|^2: what a cell and those beside it show in their middles
+//! is exceeded by (N |a|)^2 M3/2 at most, |a| the greatest distance from a middle to a corner.
 //!
 //! Cells stand together in regions; what holds around a region is the most of it and of those up to [`RINGS`] beside it. Lines of the
 //! lattice with the angle d between them are nowhere on a face nearer than asin(sin d/sqrt(2)).
@@ -26,8 +31,8 @@ use rayon::prelude::*;
 const CELLS: usize = 4;
 /// Regions that count around each.
 const RINGS: usize = 3;
-/// Of these, what is certain where the cell of a direction is known to one beside it.
-const CERTAIN: f64 = RINGS as f64 - 2.0 / CELLS as f64;
+/// Of these, what is certain where the cell of a direction is known to one beside it, and those beside a cell count for it.
+const CERTAIN: f64 = RINGS as f64 - 3.0 / CELLS as f64;
 /// The least share of the angle between two lines of the lattice that they are apart.
 const APART: f64 = 0.7;
 /// Times M1, what components of the third derivatives exceed the greatest along a great circle by.
@@ -189,9 +194,12 @@ impl Cell {
         self.weight * (wide * self.skew + wide * wide * self.size / 3.0)
     }
 
+    /// What holds in a cell where it does for this one and those beside it.
     fn steepness(&self, degree: f64, whole: Steepness) -> Steepness {
         let first = (self.first + self.size * whole.second).min(whole.first);
-        let third = self.third + (self.error(degree) + degree * self.size) * whole.third + MIXED * first;
+        let wide = degree * self.size;
+        let between = 0.5 * ROUNDING * wide * wide;
+        let third = self.third + (self.error(degree) + between) * whole.third + MIXED * first;
         let third = third.min(whole.third);
         let second = (self.second + self.size * third).min(whole.second);
         Steepness { first: (self.first + self.size * second).min(whole.first), second, third }
