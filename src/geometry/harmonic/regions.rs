@@ -30,7 +30,7 @@ use rayon::prelude::*;
 /// Cells along the edge of a region.
 const CELLS: usize = 4;
 /// Regions that count around each.
-const RINGS: usize = 3;
+const RINGS: usize = 4;
 /// Of these, what is certain where the cell of a direction is known to one beside it, and those beside a cell count for it.
 const CERTAIN: f64 = RINGS as f64 - 3.0 / CELLS as f64;
 /// The least share of the angle between two lines of the lattice that they are apart.

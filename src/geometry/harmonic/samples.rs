@@ -74,6 +74,11 @@ impl Samples {
         self.regions.reach()
     }
 
+    /// What holds around the direction `n`, as far as `reach`.
+    pub(super) fn around(&self, n: DVec3) -> &Steepness {
+        self.regions.around(self.lattice.beside(n))
+    }
+
     /// Memory \[bytes\].
     pub(super) fn bytes(&self) -> u64 {
         size_of_val(&self.all[..]) as u64 + self.regions.bytes()

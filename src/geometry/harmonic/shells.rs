@@ -10,11 +10,12 @@
 use super::Star;
 use super::bounds::Bounds;
 use super::lattice::Lattice;
+use super::regions::Steepness;
 use crate::math::DVec3;
 use rayon::prelude::*;
 
 /// Samples along an edge of the cube, at most.
-const SAMPLES: usize = 384;
+const SAMPLES: usize = 256;
 /// Samples along an edge of a triangle, at most: beyond, triangles are coarser than what lies between samples.
 const PARTS: usize = 16;
 
@@ -62,6 +63,17 @@ impl Shells {
     }
 }
 
+impl Star {
+    /// Bounds of its derivatives in all directions of a triangle.
+    fn steepness(&self, corners: &[DVec3; 3]) -> Steepness {
+        let middle = corners.iter().map(|c| c.normalize()).sum::<DVec3>().normalize();
+        // A chord is no shorter than the sine of its angle; the corners are the farthest.
+        let far = corners.iter().map(|c| c.normalize().distance(middle)).fold(0.0, f64::max);
+        let Bounds { first, second, third, .. } = self.bounds;
+        if far < self.samples.reach() { *self.samples.around(middle) } else { Steepness { first, second, third } }
+    }
+}
+
 /// Two triangles for each cell of the faces of the cube, their fronts outward.
 fn triangles(lattice: &Lattice) -> impl Iterator<Item = [[usize; 3]; 3]> {
     let n = lattice.cells();
@@ -82,7 +94,7 @@ fn quotients(star: &Star, corners: &[DVec3; 3], parts: usize) -> (f64, f64) {
     let longest = (b - a).length().max((c - b).length()).max((a - c).length());
     let plane = (b - a).cross(c - a).normalize_or_zero().dot(a).abs();
     let nearest = plane.max(a.length().min(b.length()).min(c.length()) - longest);
-    let Bounds { first, second, .. } = star.bounds;
+    let Steepness { first, second, .. } = star.steepness(corners);
     let bend = (second + 3.0 * first + 2.0 * star.bounds.high) / (nearest * nearest * nearest);
     let edge = longest / parts as f64;
     let slack = bend * edge * edge / 6.0;
