@@ -94,9 +94,10 @@ impl Samples {
 
     /// F and its derivatives at `x`, along the unit vector `d`.
     pub(super) fn height(&self, x: DVec3, d: DVec3) -> Guess<'_> {
+        // Of x, which is there sooner than n: what it leads to may be far away in memory.
+        let Near { sample, v, around } = self.beside(x);
         let length = x.length();
         let n = x / length;
-        let Near { sample, v, around } = self.beside(n);
         let (w, angle) = way(v, n);
         let (gradient, hessian) = sample.derivatives();
         let bent = hessian * w;
@@ -104,8 +105,10 @@ impl Samples {
 
         let c = n.dot(d);
         let across = d - c * n;
-        let gradient = turned(v, n, gradient + bent);
-        let across = turned(n, v, across);
+        let (sum, share) = (v + n, 1.0 / (1.0 + v.dot(n)));
+        let gradient = gradient + bent;
+        let gradient = gradient - gradient.dot(n) * share * sum;
+        let across = across - across.dot(v) * share * sum;
         let slope = gradient.dot(d);
         let bend = across.dot(hessian * across);
         let sine_squared = 1.0 - c * c;
@@ -148,7 +151,7 @@ impl Samples {
         around.third * angle * angle * angle / 6.0 + HALF_ULP * (self.bounds.high + self.bounds.first)
     }
 
-    /// A sample beside the direction `n`.
+    /// A sample beside the direction of `n`.
     fn beside(&self, n: DVec3) -> Near<'_> {
         let at = self.lattice.beside(n);
         let (sample, around) = (&self.all[self.lattice.number(at)], self.regions.around(at));
