@@ -3,6 +3,7 @@
 use super::lattice::Lattice;
 use super::outline::Sort;
 use super::roots::Wave;
+use super::samples::Guess;
 use super::{Harmonic, Series, Star};
 use crate::geometry::simd::Path;
 use crate::geometry::visibility::{BUNDLE, BUNDLES, Points, TILE};
