@@ -31,8 +31,9 @@ pub struct Harmonic {
     pub(super) shells: Option<Arc<Shelled>>,
 }
 
-/// Cells of the meshes along an edge of the cube.
-const FINE: usize = 32;
+/// Cells of the meshes along an edge of the cube: what is left between them is soon told by the series, least of all that is blocked.
+const INNER: usize = 16;
+const OUTER: usize = 32;
 
 /// What a distance from the centre is widened by for its rounding.
 const ROUNDING: f64 = 1.0 + 1e-9;
@@ -165,17 +166,15 @@ impl Harmonic {
             let triangles: Vec<_> = triangles.iter().map(|&t| turned(t).map(place)).collect();
             Mesh::within(&triangles, Build::Thorough, around)
         };
-        let pair = |shells: &Shells| {
-            let (inner, outer) = rayon::join(|| mesh(&shells.inner), || mesh(&shells.outer));
-            Pair { inner, outer, reach: shells.reach }
-        };
-        let [coarse, fine] = [cage::CELLS, FINE].map(|cells| Shells::new(&self.star, cells, margin));
+        let shells = |cells: usize| Shells::new(&self.star, cells, margin);
+        let [coarse, inside, outside] = [cage::CELLS, INNER, OUTER].map(shells);
         let cage = Cage::new(&coarse, &self.to_world);
-        let shelled = Shelled { cage, fine: pair(&fine) };
-        self.star.hull = Some(Arc::new(Hull::new(&fine.outer)));
+        let (inner, outer) = rayon::join(|| mesh(&inside.inner), || mesh(&outside.outer));
+        self.star.hull = Some(Arc::new(Hull::new(&outside.outer)));
+        let fine = Pair { inner, outer, reach: outside.reach };
         let reach = self.around().1 * fine.reach * ROUNDING;
         self.reach2 = reach * reach;
-        self.shells = Some(Arc::new(shelled));
+        self.shells = Some(Arc::new(Shelled { cage, fine }));
         self
     }
 
