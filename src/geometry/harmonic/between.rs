@@ -111,16 +111,15 @@ impl Harmonic {
         let (low, high) = points.ends.tile;
         let (low, high) = (DVec3::from(low.map(f64::from)), DVec3::from(high.map(f64::from)));
         let (middle, half) = (0.5 * (low + high) - self.center, 0.5 * (high - low));
+        let placed = (&self.to_world, self.world_radii());
         // Points far from all have no part in the box.
-        points.ends.far == none && hull.is_apart(&self.to_world, apex.as_dvec3() - self.center, (middle, half))
+        points.ends.far == none && hull.is_apart(placed, apex.as_dvec3() - self.center, (middle, half))
     }
 
     /// How the object is seen from `apex` \[m\].
     pub(super) fn outline(&self, apex: Vec3) -> Option<Box<Outline>> {
-        let (center, high, _) = self.around();
-        let low = self.star.bounds.low / self.shrunk;
         let Shelled { cage, fine } = self.shells.as_deref()?;
-        Outline::new(cage, (low, high), apex.as_dvec3() - center, fine.outer.path).map(Box::new)
+        Outline::new(cage, self.world_radii(), apex.as_dvec3() - self.center, fine.outer.path).map(Box::new)
     }
 
     /// The same for an `apex` that may be within the outer mesh, where it is `here`.

@@ -55,8 +55,14 @@ impl Hull {
     }
 
     /// True where a plane certainly stands between the surface, which `to_world` places, and all ways from `apex` to a box, of which the middle and half the
-    /// extents are given, both seen from the centre.
-    pub(super) fn is_apart(&self, to_world: &DMat3, apex: DVec3, (middle, half): (DVec3, DVec3)) -> bool {
+    /// extents are given, both seen from the centre. No plane nearer to that than the first of these `radii` does, all farther than the second
+    /// do: that tells most, and much sooner.
+    pub(super) fn is_apart(
+        &self,
+        (to_world, radii): (&DMat3, (f64, f64)),
+        apex: DVec3,
+        (middle, half): (DVec3, DVec3),
+    ) -> bool {
         let way = middle - apex;
         let length2 = way.length_squared().max(f64::MIN_POSITIVE);
         // Across the nearest point of the way to the middle.
@@ -68,7 +74,9 @@ impl Hull {
         let gained = (length2 - way.abs().dot(half)).max(f64::MIN_POSITIVE);
         let n = n + ((of_apex - of_box) / gained).clamp(0.0, 1.0) * way;
         let [of_apex, of_box] = beyond(n);
-        of_apex.min(of_box) > self.support(to_world.transpose() * n)
+        let height = of_apex.min(of_box);
+        let is_above = |radius: f64| height * height > radius * radius * (1.0 + ROUNDING) * n.length_squared();
+        height > 0.0 && is_above(radii.0) && (is_above(radii.1) || height > self.support(to_world.transpose() * n))
     }
 
     /// No point of the surface has a greater product with `n`.
@@ -156,9 +164,11 @@ mod tests {
                 (apex + way * (-apex.dot(way) / way.length_squared()).clamp(0.0, 1.0)).length()
             };
             let nearest = (0..8).map(|k| nearest(corner(k))).fold(f64::INFINITY, f64::min);
-            let is_apart = hull.is_apart(&DMat3::IDENTITY, apex, (middle, half));
+            let [is_apart, by_support] = [(0.9, 1.0), (0.0, f64::INFINITY)]
+                .map(|radii| hull.is_apart((&DMat3::IDENTITY, radii), apex, (middle, half)));
             // Of corners some hundredths apart.
-            assert!(!is_apart || nearest > 0.99, "{apex} {middle} {half}: {nearest}");
+            assert!(!(is_apart || by_support) || nearest > 0.99, "{apex} {middle} {half}: {nearest}");
+            assert!(is_apart || !by_support, "{apex} {middle} {half}");
             (apart, clear) = (apart + usize::from(is_apart), clear + usize::from(nearest > 1.0));
         }
         // One plane through both ends does not part all that could be.

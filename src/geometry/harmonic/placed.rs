@@ -116,6 +116,11 @@ impl Harmonic {
         (self.center, self.stretched * self.star.bounds.high, self.stretched)
     }
 
+    /// No point of the surface is nearer to the centre than the first, none farther than the second \[m\].
+    pub(super) fn world_radii(&self) -> (f64, f64) {
+        (self.star.bounds.low / self.shrunk, self.stretched * self.star.bounds.high)
+    }
+
     /// The same object elsewhere.
     pub fn moved(mut self, by: DVec3) -> Self {
         self.center += by;

@@ -16,7 +16,7 @@
 //! negative, sum l_i b_i = 0. Along each, D(w)(w,w) with w carried along is a sum of waves of up to N turns, whose second derivative is at
 //! most N^2 M3 (Bernstein). So D(w)(w,w) at x is the mean of those in the middles up to sum l_i |b_i|^2 N^2 M3/2, where
 //! sum l_i |b_i|^2 <= sum l_i |b_i - o|^2 for any o, and with that of q no more than |a|^2: what a cell and those beside it show in their middles
-//! is exceeded by (N |a|)^2 M3/2 at most, |a| the greatest distance from a middle to a corner.
+//! is exceeded by (N |a|)^2 M3/2 at most, |a| the greatest distance from a middle to a corner in all of the lattice.
 //!
 //! Cells stand together in regions; what holds around a region is the most of it and of those up to [`RINGS`] beside it. Lines of the
 //! lattice with the angle d between them are nowhere on a face nearer than asin(sin d/sqrt(2)).
@@ -93,13 +93,17 @@ impl Regions {
             Cell::new([corner(0, 0), corner(0, 1), corner(1, 0), corner(1, 1)])
         };
         let all: Vec<Cell> = (0..6 * cells * cells).into_par_iter().map(cell).collect();
-        let third = third_of_all(&all, degree as f64, whole);
+        let size = all.iter().map(|cell| cell.size).fold(0.0, f64::max);
+        let third = third_of_all(&all, size, degree as f64, whole);
         let whole = Steepness { third, ..whole };
+        // How far third derivatives exceed what is shown in the middles around.
+        let wide = degree as f64 * size;
+        let between = 0.5 * ROUNDING * wide * wide * third;
         let mut own = vec![Steepness::default(); 6 * edge * edge];
         for (k, cell) in all.iter().enumerate() {
             let (face, u, v) = (k / (cells * cells), k / cells % cells / CELLS, k % cells / CELLS);
             let region = &mut own[(face * edge + u) * edge + v];
-            *region = region.max(cell.steepness(degree as f64, whole));
+            *region = region.max(cell.steepness(degree as f64, between, whole));
         }
         let angle = APART * CERTAIN * 0.5 * PI / edge as f64;
         Regions { edge, around: spread(edge, own), third, reach: sin(angle) }
@@ -194,22 +198,19 @@ impl Cell {
         self.weight * (wide * self.skew + wide * wide * self.size / 3.0)
     }
 
-    /// What holds in a cell where it does for this one and those beside it.
-    fn steepness(&self, degree: f64, whole: Steepness) -> Steepness {
+    /// What holds in a cell where it does for this one and those beside it, if third derivatives exceed what the middles show by no more than `between`.
+    fn steepness(&self, degree: f64, between: f64, whole: Steepness) -> Steepness {
         let first = (self.first + self.size * whole.second).min(whole.first);
-        let wide = degree * self.size;
-        let between = 0.5 * ROUNDING * wide * wide;
-        let third = self.third + (self.error(degree) + between) * whole.third + MIXED * first;
+        let third = self.third + self.error(degree) * whole.third + between + MIXED * first;
         let third = third.min(whole.third);
         let second = (self.second + self.size * third).min(whole.second);
         Steepness { first: (self.first + self.size * second).min(whole.first), second, third }
     }
 }
 
-/// M3 by what all cells show: at most that of `rough`.
-fn third_of_all(all: &[Cell], degree: f64, rough: Steepness) -> f64 {
+/// M3 by what all cells show, of which none is greater than `size`: at most that of `rough`.
+fn third_of_all(all: &[Cell], size: f64, degree: f64, rough: Steepness) -> f64 {
     let sampled = all.iter().map(|cell| cell.third).fold(0.0, f64::max);
-    let size = all.iter().map(|cell| cell.size).fold(0.0, f64::max);
     let error = all.iter().map(|cell| cell.error(degree)).fold(0.0, f64::max);
     let share = cos((degree * size).min(2.0)) - error;
     // The error is in units of M3 and not of the greatest D(w)(w,w).
