@@ -250,15 +250,18 @@ impl Star {
 
     /// The way within which F, or -F, crosses 0 from a place `x` on a line: where it certainly does, once, without having turned.
     fn certain_fall(&self, x: DVec3, fall: &Fall) -> Option<f64> {
-        let Fall { along, errors, around, .. } = fall;
+        let Fall { along, errors, around, side, .. } = fall;
         let (length, reach) = (x.length(), self.samples.reach());
         let (value, steep) = (along.value.max(0.0) + errors.value, -along.first - errors.first);
-        if steep <= 0.0 || 2.0 * value > steep * reach * length {
+        // Twice as far as the zero of the tangent.
+        let way = 2.0 * value / steep;
+        if steep <= 0.0 || way > reach * length {
             return None;
         }
-        let [most, _] = around.of_lines((1.0 - reach) * length, -1.0);
-        // At twice the way to the zero of the tangent F is below 0, and its slope still is.
-        (4.0 * most * value < steep * steep).then(|| 2.0 * value / steep)
+        let [_, third] = around.of_lines((1.0 - reach) * length, *side);
+        // The slope is still below 0 there; so it has been less than half of it on the whole, and F is below 0.
+        let bend = along.second + errors.second;
+        (way * (bend + 0.5 * third * way) < steep).then_some(way)
     }
 
     /// The crossing of the line from `o` along `d` that is at the distance `at`.
