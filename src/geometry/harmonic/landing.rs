@@ -13,7 +13,7 @@
 //! where a^3 is nothing where a^2 is little. Where it is not, as at a grazing line, the next sum begins nearer.
 
 use super::bounds::hessian;
-use super::samples::{turned, way};
+use super::samples::{Turn, way};
 use super::{Bend, Crossing, Fall, ROUNDING, Slope, Star, height, normal_and_area};
 use crate::math::DVec3;
 
@@ -72,7 +72,7 @@ fn crossing_beside(n: DVec3, bend: &Bend, x: DVec3, at: f64) -> Crossing {
     let (w, _) = way(n, there);
     let (slope, bent) = (bend.slope(n), hessian(bend, n) * w);
     let value = slope.value + w.dot(slope.gradient + 0.5 * bent);
-    let gradient = turned(n, there, slope.gradient + bent);
+    let gradient = Turn::new(n, there).on(slope.gradient + bent);
     let (normal, _) = normal_and_area(&Slope { value, gradient }, there);
     Crossing { distance: at, position: value * there, normal }
 }

@@ -36,8 +36,10 @@ const LEAST: f64 = 1e-3;
 
 /// Nearer than so many times the greatest distance of a corner from the centre no outline is made.
 const BEYOND: f64 = 1.01;
-/// Outlines of an object at one time, at most: of 1 kB each.
+/// Outlines of an object at one time, at most.
 const MOST: usize = 1 << 14;
+/// Memory of all of them, where so many are wanted \[bytes\].
+pub(super) const MOST_BYTES: u64 = (MOST * size_of::<Outline>()) as u64;
 
 /// The outline from an apex, from when it is first asked for.
 pub(in crate::geometry) type Prospect = OnceLock<Option<Box<Outline>>>;

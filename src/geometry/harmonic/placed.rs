@@ -3,6 +3,7 @@
 use super::beside::Beside;
 use super::cage::{self, Cage};
 use super::hull::Hull;
+use super::outline::MOST_BYTES;
 use super::rise::Rise;
 use super::shells::Shells;
 use super::{Star, normal_and_area};
@@ -77,11 +78,11 @@ impl Harmonic {
         Ok(harmonic)
     }
 
-    /// Memory of its samples and meshes \[bytes\]; what the series takes is in proportion to its file.
+    /// Memory of its samples and meshes, and of outlines at most \[bytes\]; what the series takes is in proportion to its file.
     pub(in crate::geometry) fn bytes(&self) -> u64 {
         let of = |pair: &Pair| pair.inner.bytes() + pair.outer.bytes();
         self.star.samples.bytes()
-            + self.shells.as_ref().map_or(0, |shells| shells.cage.bytes() + of(&shells.fine))
+            + self.shells.as_ref().map_or(0, |shells| shells.cage.bytes() + of(&shells.fine) + MOST_BYTES)
             + self.star.hull.as_ref().map_or(0, |hull| hull.bytes())
     }
 

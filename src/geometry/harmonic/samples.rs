@@ -104,11 +104,9 @@ impl Samples {
         let value = f64::from(sample.value) + w.dot(gradient + 0.5 * bent);
 
         let c = n.dot(d);
-        let across = d - c * n;
-        let (sum, share) = (v + n, 1.0 / (1.0 + v.dot(n)));
-        let gradient = gradient + bent;
-        let gradient = gradient - gradient.dot(n) * share * sum;
-        let across = across - across.dot(v) * share * sum;
+        let turn = Turn::new(v, n);
+        let gradient = turn.on(gradient + bent);
+        let across = turn.back(d - c * n);
         let slope = gradient.dot(d);
         let bend = across.dot(hessian * across);
         let sine_squared = 1.0 - c * c;
@@ -129,7 +127,7 @@ impl Samples {
         let slope = gradient + bent;
         Look {
             value: f64::from(sample.value) + w.dot(gradient + 0.5 * bent),
-            gradient: turned(v, n, slope),
+            gradient: Turn::new(v, n).on(slope),
             hessian: carried(v, n, hessian),
             errors: self.errors(around, angle, 1.0),
             around,
@@ -236,9 +234,28 @@ impl Sample {
     }
 }
 
-/// What is `across` the direction `from`, turned with it to `to` along the great circle.
-pub(super) fn turned(from: DVec3, to: DVec3, across: DVec3) -> DVec3 {
-    across - across.dot(to) / (1.0 + from.dot(to)) * (from + to)
+/// The rotation along the great circle from one direction to another.
+pub(super) struct Turn {
+    from: DVec3,
+    to: DVec3,
+    sum: DVec3,
+    share: f64,
+}
+
+impl Turn {
+    pub(super) fn new(from: DVec3, to: DVec3) -> Turn {
+        Turn { from, to, sum: from + to, share: 1.0 / (1.0 + from.dot(to)) }
+    }
+
+    /// What is `across` the first direction, turned to the second.
+    pub(super) fn on(&self, across: DVec3) -> DVec3 {
+        across - across.dot(self.to) * self.share * self.sum
+    }
+
+    /// What is `across` the second direction, turned back to the first.
+    fn back(&self, across: DVec3) -> DVec3 {
+        across - across.dot(self.from) * self.share * self.sum
+    }
 }
 
 /// The way on the sphere from `v` to `n` near by, as long as the angle, and no less than that.
