@@ -259,7 +259,7 @@ impl Star {
             return None;
         }
         let [_, third] = around.of_lines((1.0 - reach) * length, *side);
-        // The slope is still below 0 there; so it has been less than half of it on the whole, and F is below 0.
+        // What bounds the slope is convex: where it is below 0 at the end too, its mean is below -steep/2, and F is below 0 there.
         let bend = along.second + errors.second;
         (way * (bend + 0.5 * third * way) < steep).then_some(way)
     }

@@ -19,6 +19,8 @@ const LINES: usize = CELLS + 1;
 const TOGETHER: usize = 32;
 /// What is added for rounding, in units of |n| times the greatest distance.
 const ROUNDING: f64 = 1e-12;
+/// What the square of a radius is widened by for the rounding of transforms and products.
+const WIDENED: f64 = 1.0 + 1e-9;
 
 /// The support function of a surface, from above.
 #[derive(Debug)]
@@ -55,8 +57,8 @@ impl Hull {
     }
 
     /// True where a plane certainly stands between the surface, which `to_world` places, and all ways from `apex` to a box, of which the middle and half the
-    /// extents are given, both seen from the centre. No plane nearer to that than the first of these `radii` does, all farther than the second
-    /// do: that tells most, and much sooner.
+    /// extents are given, both seen from the centre. No plane nearer to the centre than the first of these `radii`
+    /// does, all farther than the second do: that tells most, and much sooner.
     pub(super) fn is_apart(
         &self,
         (to_world, radii): (&DMat3, (f64, f64)),
@@ -75,7 +77,7 @@ impl Hull {
         let n = n + ((of_apex - of_box) / gained).clamp(0.0, 1.0) * way;
         let [of_apex, of_box] = beyond(n);
         let height = of_apex.min(of_box);
-        let is_above = |radius: f64| height * height > radius * radius * (1.0 + ROUNDING) * n.length_squared();
+        let is_above = |radius: f64| height * height > radius * radius * WIDENED * n.length_squared();
         height > 0.0 && is_above(radii.0) && (is_above(radii.1) || height > self.support(to_world.transpose() * n))
     }
 
@@ -169,7 +171,7 @@ mod tests {
             // Of corners some hundredths apart.
             assert!(!(is_apart || by_support) || nearest > 0.99, "{apex} {middle} {half}: {nearest}");
             assert!(is_apart || !by_support, "{apex} {middle} {half}");
-            (apart, clear) = (apart + usize::from(is_apart), clear + usize::from(nearest > 1.0));
+            (apart, clear) = (apart + usize::from(by_support), clear + usize::from(nearest > 1.0));
         }
         // One plane through both ends does not part all that could be.
         assert!(apart <= clear && 10 * apart > 8 * clear, "{apart} of {clear}");

@@ -224,6 +224,7 @@ impl Draft {
         let inverse = 1.0 / (high.turn - low.turn);
         self.spread(low, high.turn, [0, 1].map(|k| (high.w[k] - low.w[k]) * inverse));
     }
+
     /// Takes in the end of a line, in both wedges where it is at the border of two.
     #[inline(always)]
     fn end(&mut self, at: Bearing) {

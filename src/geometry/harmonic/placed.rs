@@ -114,7 +114,7 @@ impl Harmonic {
 
     /// Its centre, the radius of a ball about that around it \[m\], and how much longer it is here than in its own coordinates, at most.
     pub fn around(&self) -> (DVec3, f64, f64) {
-        (self.center, self.stretched * self.star.bounds.high, self.stretched)
+        (self.center, self.world_radii().1, self.stretched)
     }
 
     /// No point of the surface is nearer to the centre than the first, none farther than the second \[m\].

@@ -96,14 +96,11 @@ impl Regions {
         let size = all.iter().map(|cell| cell.size).fold(0.0, f64::max);
         let third = third_of_all(&all, size, degree as f64, whole);
         let whole = Steepness { third, ..whole };
-        // How far third derivatives exceed what is shown in the middles around.
-        let wide = degree as f64 * size;
-        let between = 0.5 * ROUNDING * wide * wide * third;
         let mut own = vec![Steepness::default(); 6 * edge * edge];
         for (k, cell) in all.iter().enumerate() {
             let (face, u, v) = (k / (cells * cells), k / cells % cells / CELLS, k % cells / CELLS);
             let region = &mut own[(face * edge + u) * edge + v];
-            *region = region.max(cell.steepness(degree as f64, between, whole));
+            *region = region.max(cell.steepness(size, degree as f64, whole));
         }
         let angle = APART * CERTAIN * 0.5 * PI / edge as f64;
         Regions { edge, around: spread(edge, own), third, reach: sin(angle) }
@@ -163,7 +160,7 @@ struct Cell {
     third: f64,
     /// How much an error of D(u) and D(v) counts in that.
     weight: f64,
-    /// No point of it is farther from a corner, or from the middle.
+    /// No point of it is farther from a corner, or from the middle, and by so much less that ways on the sphere may be taken for those in a plane.
     size: f64,
     /// s.
     skew: f64,
@@ -198,13 +195,15 @@ impl Cell {
         self.weight * (wide * self.skew + wide * wide * self.size / 3.0)
     }
 
-    /// What holds in a cell where it does for this one and those beside it, if third derivatives exceed what the middles show by no more than `between`.
-    fn steepness(&self, degree: f64, between: f64, whole: Steepness) -> Steepness {
-        let first = (self.first + self.size * whole.second).min(whole.first);
-        let third = self.third + self.error(degree) * whole.third + between + MIXED * first;
+    /// What holds in a cell where it does for this one and those beside it, none of which is greater than `size`.
+    fn steepness(&self, size: f64, degree: f64, whole: Steepness) -> Steepness {
+        let first = (self.first + size * whole.second).min(whole.first);
+        let wide = degree * size;
+        let between = 0.5 * ROUNDING * wide * wide;
+        let third = self.third + (self.error(degree) + between) * whole.third + MIXED * first;
         let third = third.min(whole.third);
-        let second = (self.second + self.size * third).min(whole.second);
-        Steepness { first: (self.first + self.size * second).min(whole.first), second, third }
+        let second = (self.second + size * third).min(whole.second);
+        Steepness { first: (self.first + size * second).min(whole.first), second, third }
     }
 }
 
